@@ -1,0 +1,6 @@
+//! Test support: adapter choice, sentinels, comparisons that are themselves tested, an f64
+//! reference renderer, image metrics.
+//!
+//! Everything here may block, submit and panic: it is for tests, benches and examples only.
+
+pub mod gpu;
