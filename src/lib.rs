@@ -1,0 +1,1 @@
+//! Exact isosurfaces of ZFP-compressed volumes, rendered progressively.
