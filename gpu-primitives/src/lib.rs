@@ -1,0 +1,17 @@
+//! GPU building blocks shared by more than one stage: WGSL composition, accounted memory, upload,
+//! readback, indirect arguments, scan and stream compaction.
+//!
+//! Everything here only records commands: nothing submits, polls, maps synchronously or blocks.
+//! Counts stay on the GPU and drive indirect dispatches.
+
+pub use wgpu;
+
+pub mod compact;
+pub mod cpu;
+pub mod indirect;
+pub mod kernel;
+pub mod memory;
+pub mod readback;
+pub mod scan;
+pub mod upload;
+pub mod wgsl;
