@@ -77,15 +77,18 @@ fn name_matches(name: &str, wanted: &str) -> bool {
 }
 
 /// Every adapter, best first: the primary back ends before OpenGL, hardware before software.
+/// OpenGL is asked only where the others have nothing, since its start-up is slow and noisy.
 fn adapters() -> Vec<wgpu::Adapter> {
-    let instance =
-        wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
-    let mut found = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
+    let found = adapters_of(wgpu::Backends::PRIMARY);
+    if found.is_empty() { adapters_of(wgpu::Backends::GL) } else { found }
+}
+
+fn adapters_of(backends: wgpu::Backends) -> Vec<wgpu::Adapter> {
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
+    descriptor.backends &= backends;
+    let instance = wgpu::Instance::new(descriptor);
+    let mut found = pollster::block_on(instance.enumerate_adapters(backends));
     found.sort_by_key(|adapter| type_rank(adapter.get_info().device_type));
-    if found.is_empty() {
-        found = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::GL));
-        found.sort_by_key(|adapter| type_rank(adapter.get_info().device_type));
-    }
     found
 }
 

@@ -4,3 +4,4 @@
 //! Everything here may block, submit and panic: it is for tests, benches and examples only.
 
 pub mod gpu;
+pub mod reference;
