@@ -1,0 +1,15 @@
+//! The bundled sample volume and generators of any size, for examples, tests and benchmarks.
+
+mod analytic;
+mod field;
+mod math;
+mod noise;
+mod sample;
+mod scans;
+mod turbulence;
+
+pub use analytic::{Gyroid, MarschnerLobb, PlaneRamp, SphereDistance};
+pub use field::{Field, NAMES, UnknownField, by_name};
+pub use sample::{generate, sample_block, samples};
+pub use scans::{RoughSolid, Shells};
+pub use turbulence::Turbulence;
