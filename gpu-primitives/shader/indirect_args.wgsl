@@ -4,7 +4,7 @@ struct IndirectArgsParams {
     count_word: u32,
     args_word: u32,
     sets: u32,
-    unused: u32,
+    max_count: u32,
     per_group: vec4<u32>,
 }
 
@@ -17,7 +17,8 @@ fn indirect_args(@builtin(local_invocation_index) slot: u32) {
     if (slot >= params.sets) {
         return;
     }
-    let groups = indirect_div_ceil(counts[params.count_word], params.per_group[slot]);
+    let count = min(counts[params.count_word], params.max_count);
+    let groups = indirect_div_ceil(count, params.per_group[slot]);
     let folded = indirect_fold(groups);
     let first = params.args_word + 3u * slot;
     arguments[first] = folded.x;

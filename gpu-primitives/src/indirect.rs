@@ -88,17 +88,19 @@ impl IndirectArgs {
         per_group: u32,
         args: (&wgpu::Buffer, u64),
     ) -> IndirectArgsBuffers {
-        self.bind_sets(device, ledger, count, &[per_group], args)
+        self.bind_sets(device, ledger, count, u32::MAX, &[per_group], args)
     }
 
     /// Like [`IndirectArgs::bind`] for several group sizes of the same count, whose arguments
-    /// follow each other; sizes beyond [`IndirectArgs::MAX_SETS`] are left out.
+    /// follow each other; sizes beyond [`IndirectArgs::MAX_SETS`] are left out. A count above
+    /// `max_count` counts as `max_count`.
     #[must_use]
     pub fn bind_sets(
         &self,
         device: &wgpu::Device,
         ledger: &Ledger,
         count: (&wgpu::Buffer, u64),
+        max_count: u32,
         per_group: &[u32],
         args: (&wgpu::Buffer, u64),
     ) -> IndirectArgsBuffers {
@@ -106,7 +108,7 @@ impl IndirectArgs {
         let (count, count_word) = window(count.0, count.1, 4);
         let (args, args_word) = window(args.0, args.1, ARGS_BYTES * sets as u64);
         let mut params = [0u32; 8];
-        params[..3].copy_from_slice(&[count_word, args_word, sets as u32]);
+        params[..4].copy_from_slice(&[count_word, args_word, sets as u32, max_count]);
         for (param, &size) in params[4..].iter_mut().zip(per_group) {
             *param = size.max(1);
         }
