@@ -3,5 +3,8 @@
 //!
 //! Everything here may block, submit and panic: it is for tests, benches and examples only.
 
+pub mod compare;
 pub mod gpu;
+pub mod image;
+pub mod layout;
 pub mod reference;
