@@ -14,14 +14,21 @@
 //! # }
 //! ```
 
+mod convert;
 mod encode;
 mod error;
+mod formats;
 mod grid;
 mod source;
+mod stats;
 mod volume;
 
 pub use encode::{BlockEncoder, encode};
 pub use error::{Error, Result};
+#[cfg(not(all(target_arch = "wasm32", target_os = "unknown")))]
+pub use formats::read_file;
+pub use formats::{Headerless, ReadOptions, read_bytes, write_zfp};
 pub use grid::{MAX_DIM, bits_per_block, pad_block};
 pub use source::{Distortion, Format, Note, SampleType, Source};
+pub use stats::{Histogram, value_range};
 pub use volume::{Block, Geometry, MAX_EXPONENT, TINY_EXPONENT, ZfpVolume};

@@ -1,5 +1,7 @@
 //! The encoder against libzfp's algorithm (by `zfp-rs`), and its checks.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use proptest::prelude::*;
 use volume_io::{BlockEncoder, Error, ZfpVolume, bits_per_block, encode, pad_block};
 use zfp_rs::{

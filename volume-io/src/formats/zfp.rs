@@ -1,0 +1,243 @@
+//! zfp streams, with zfp's own header or without.
+
+use std::io::Write;
+use std::sync::Arc;
+
+use zfp_rs::types::ZfpScalarType;
+use zfp_rs::{
+    ZfpBitStream, ZfpBitStreamRef, ZfpConfig, ZfpDimensionality, ZfpFieldMetadata, ZfpHeaderError,
+    ZfpHeaderMask, ZfpMode,
+};
+
+use crate::convert::{Converter, Sample};
+use crate::error::{Error, Result};
+use crate::formats::{Headerless, ReadOptions};
+use crate::grid::{Grid, bits_per_block};
+use crate::source::{Format, Note};
+use crate::volume::{Decoder, ZfpVolume, fixed_rate, load_words};
+
+/// Reads a stream that starts with zfp's header.
+pub(super) fn read(bytes: Arc<[u8]>, options: &ReadOptions) -> Result<ZfpVolume> {
+    let header = Header::parse(&bytes)?;
+    let mut volume = if header.is_kept() {
+        keep(&header, bytes)?
+    } else {
+        match header.scalar_type {
+            ZfpScalarType::I32 => recode::<i32>(&header, &bytes, options),
+            ZfpScalarType::I64 => recode::<i64>(&header, &bytes, options),
+            ZfpScalarType::F32 => recode::<f32>(&header, &bytes, options),
+            ZfpScalarType::F64 => recode::<f64>(&header, &bytes, options),
+        }?
+    };
+    if options.headerless.is_some() {
+        volume.source.notes.push(Note::HeaderUsed);
+    }
+    Ok(volume)
+}
+
+/// Reads a stream without a header. Its length must fit, since nothing else tells wrong dims.
+pub(super) fn read_headerless(bytes: Arc<[u8]>, layout: &Headerless) -> Result<ZfpVolume> {
+    let grid = Grid::new(layout.dims)?;
+    let bits_per_block = bits_per_block(layout.rate)?;
+    let (least, found) = (grid.stream_bytes(bits_per_block, 0), bytes.len() as u64);
+    let expected = least.next_multiple_of(8);
+    if !(least..=expected).contains(&found) {
+        let dims = layout.dims;
+        return Err(Error::LengthMismatch { dims, bits_per_block, expected, found });
+    }
+    let mut volume = ZfpVolume::from_stream(layout.dims, bits_per_block, 0, bytes)?;
+    volume.source.format = Format::ZfpHeaderless;
+    Ok(volume)
+}
+
+/// What zfp's header says.
+struct Header {
+    scalar_type: ZfpScalarType,
+    rank: u32,
+    dims: [u32; 3],
+    config: ZfpConfig,
+    /// Length of the header, which need not end at a byte: 96 or 148.
+    bits: u64,
+}
+
+impl Header {
+    fn parse(bytes: &[u8]) -> Result<Self> {
+        let mut words = [0; 3];
+        load_words(bytes, 0, &mut words);
+        let header = ZfpBitStreamRef::from_words(&words)
+            .read_header(ZfpHeaderMask::FULL)
+            .map_err(|error| invalid(error, bytes))?;
+        let bits = header.bits_read as u64;
+        let (expected, found) = (bits.div_ceil(8), bytes.len() as u64);
+        if found < expected {
+            return Err(Error::TooShort { expected, found });
+        }
+        let (Some(metadata), Some(config)) = (header.metadata, header.config) else {
+            return Err(invalid(ZfpHeaderError::InvalidMetadata, bytes));
+        };
+        let (rank, dims) = shape(&metadata)?;
+        Ok(Self { scalar_type: metadata.scalar_type, rank, dims, config, bits })
+    }
+
+    /// Whether the stream is of the kind that the GPU decodes.
+    fn is_kept(&self) -> bool {
+        self.scalar_type == ZfpScalarType::F32
+            && self.rank == 3
+            && self.config.mode() == ZfpMode::FixedRate
+    }
+}
+
+fn invalid(error: ZfpHeaderError, bytes: &[u8]) -> Error {
+    let (field, expected) = match error {
+        ZfpHeaderError::InvalidMagic => ("magic", "\"zfp\" and codec version 5"),
+        ZfpHeaderError::InvalidMode => ("mode", "valid compression parameters"),
+        _ => ("metadata", "a valid type and shape"),
+    };
+    let start: Vec<u8> = bytes.iter().take(19).copied().collect();
+    let found = format!("bytes {start:02x?}");
+    Error::InvalidHeader { format: Format::Zfp, field, expected: expected.into(), found }
+}
+
+/// Number of axes and sizes of a field; missing axes have size 1.
+fn shape(metadata: &ZfpFieldMetadata) -> Result<(u32, [u32; 3])> {
+    let rank = metadata.dims.iter().take_while(|&&n| n > 0).count();
+    if rank == 4 {
+        return Err(Error::Unsupported {
+            format: Format::Zfp,
+            expected: "an array of 1 to 3 dimensions",
+            found: format!("4 dimensions, {:?}", metadata.dims),
+        });
+    }
+    let sizes = metadata.dims.get(..rank).unwrap_or(&[]);
+    let mut dims = [1; 3];
+    for (dim, &size) in dims.iter_mut().zip(sizes) {
+        *dim = u32::try_from(size).unwrap_or(u32::MAX);
+    }
+    // Refuses sizes beyond the limit; names all sizes as the file has them.
+    Grid::new(dims)
+        .map_err(|_error| Error::Dims { dims: sizes.iter().map(|&n| n as u64).collect() })?;
+    Ok((rank as u32, dims))
+}
+
+fn keep(header: &Header, bytes: Arc<[u8]>) -> Result<ZfpVolume> {
+    let found = bytes.len() as u64;
+    let bits_per_block = header.config.max_bits();
+    let mut volume = ZfpVolume::from_stream(header.dims, bits_per_block, header.bits, bytes)?;
+    volume.source.format = Format::Zfp;
+    let end = volume.grid().stream_bytes(bits_per_block, header.bits);
+    note_trailing(&mut volume, end, found);
+    Ok(volume)
+}
+
+/// Bytes after the word in which a stream ends are no part of it.
+fn note_trailing(volume: &mut ZfpVolume, end: u64, found: u64) {
+    let trailing = found.saturating_sub(end.next_multiple_of(8));
+    if trailing > 0 {
+        volume.source.notes.push(Note::TrailingBytes(trailing));
+    }
+}
+
+/// Decodes a stream of any mode block by block and encodes it anew. Fields of lower rank have the
+/// same blocks in the same order, only flat.
+fn recode<T: Sample>(header: &Header, bytes: &[u8], options: &ReadOptions) -> Result<ZfpVolume> {
+    let (rank, block_size) = match header.rank {
+        1 => (ZfpDimensionality::D1, 4),
+        2 => (ZfpDimensionality::D2, 16),
+        _ => (ZfpDimensionality::D3, 64),
+    };
+    let mut converter = Converter::new(header.dims, options)?;
+    let blocks = converter.block_count();
+    let found = bytes.len() as u64;
+    let least = u64::from(header.config.min_bits());
+    let expected = header.bits.saturating_add(blocks.saturating_mul(least)).div_ceil(8);
+    if found < expected {
+        return Err(Error::TooShort { expected, found });
+    }
+    let mut decoder = Decoder::new(header.config, rank);
+    let mut samples = [T::default(); 64];
+    let mut position = header.bits;
+    for block in 0..blocks {
+        let flat = samples.get_mut(..block_size).unwrap_or_default();
+        position += decoder.decode(bytes, position, flat)?;
+        if position > found * 8 {
+            return Err(Error::StreamEnds { block, blocks, found: found * 8 });
+        }
+        converter.push(samples.map(Sample::to_f64))?;
+    }
+    let mut volume = converter.finish(Format::Zfp, header.scalar_type.into(), header.rank)?;
+    note_trailing(&mut volume, position.div_ceil(8), found);
+    Ok(volume)
+}
+
+/// Writes a volume with zfp's own header, so that the `zfp` program (option `-h`) and libzfp read
+/// it; returns the number of bytes. Geometry has no place in this format.
+///
+/// # Errors
+/// [`Error::Io`] from the writer; [`Error::Dims`], [`Error::BitsPerBlock`] or [`Error::TooShort`]
+/// for a volume whose fields contradict each other.
+pub fn write_zfp(volume: &ZfpVolume, writer: impl Write) -> Result<u64> {
+    let grid = Grid::new(volume.dims)?;
+    crate::volume::check_bits_per_block(volume.bits_per_block)?;
+    let expected = grid.stream_bytes(volume.bits_per_block, volume.first_bit);
+    let found = volume.bytes.len() as u64;
+    if found < expected {
+        return Err(Error::TooShort { expected, found });
+    }
+    let (words, header_bits) = header_words(volume)?;
+    let total = grid.block_count() * u64::from(volume.bits_per_block);
+    write_words(volume, &words, header_bits, total, writer)
+        .map_err(|source| Error::Io { name: "the zfp stream to write".into(), source })
+}
+
+/// The header of a volume as words, and its length in bits.
+fn header_words(volume: &ZfpVolume) -> Result<(Vec<u64>, u32)> {
+    let codec = |reason: String| Error::Codec { reason };
+    let [nx, ny, nz] = volume.dims.map(|n| n as usize);
+    let metadata = ZfpFieldMetadata { scalar_type: ZfpScalarType::F32, dims: [nx, ny, nz, 0] };
+    let mut stream = ZfpBitStream::new(24).map_err(|error| codec(error.to_string()))?;
+    let bits = stream
+        .write_header(&fixed_rate(volume.bits_per_block), &metadata, ZfpHeaderMask::FULL)
+        .map_err(|error| codec(error.to_string()))?;
+    Ok((stream.into_words(), bits as u32))
+}
+
+/// Writes the header and, right behind its last bit, `total` bits of the stream.
+fn write_words(
+    volume: &ZfpVolume,
+    header: &[u64],
+    header_bits: u32,
+    total: u64,
+    writer: impl Write,
+) -> std::io::Result<u64> {
+    let mut writer = std::io::BufWriter::new(writer);
+    let complete = (header_bits / 64) as usize;
+    for word in header.iter().take(complete) {
+        writer.write_all(&word.to_le_bytes())?;
+    }
+    let shift = header_bits % 64;
+    let mut carry = header.get(complete).copied().unwrap_or(0);
+    let mut written = 8 * complete as u64;
+    let mut done = 0;
+    while done < total {
+        let count = (total - done).min(64) as u32;
+        let bits = bits_at(&volume.bytes, volume.first_bit + done) & (u64::MAX >> (64 - count));
+        writer.write_all(&(carry | bits << shift).to_le_bytes())?;
+        written += 8;
+        carry = bits.checked_shr(64 - shift).unwrap_or(0);
+        done += 64;
+    }
+    if written < 8 * (u64::from(header_bits) + total).div_ceil(64) {
+        writer.write_all(&carry.to_le_bytes())?;
+        written += 8;
+    }
+    writer.flush()?;
+    Ok(written)
+}
+
+/// 64 bits from any position.
+fn bits_at(bytes: &[u8], bit: u64) -> u64 {
+    let mut words = [0; 2];
+    load_words(bytes, bit / 8, &mut words);
+    let shift = (bit % 8) as u32;
+    words[0] >> shift | words[1].checked_shl(64 - shift).unwrap_or(0)
+}
