@@ -1,6 +1,7 @@
 //! The bundled sample volume and generators of any size, for examples, tests and benchmarks.
 
 mod analytic;
+mod brain;
 mod field;
 mod math;
 mod noise;
@@ -9,6 +10,7 @@ mod scans;
 mod turbulence;
 
 pub use analytic::{Gyroid, MarschnerLobb, PlaneRamp, SphereDistance};
+pub use brain::{BRAIN_ISOVALUE, BRAIN_RATE, brain};
 pub use field::{Field, NAMES, UnknownField, by_name};
 pub use sample::{generate, sample_block, samples};
 pub use scans::{RoughSolid, Shells};

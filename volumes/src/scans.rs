@@ -13,7 +13,7 @@ use crate::noise::{Octaves, voxel_noise};
 /// `f = offset - 1000 + sum over shells k of rise_k S(1/2 + (radius_k - q) / width) + noise g(p)`
 ///
 /// Shells from outside in: fat -100 HU at radius 0.86, muscle 50 at 0.80, bone 1100 at 0.70, soft
-/// tissue 35 at 0.58, a fluid core 5 at 0.22. The edges are `edge` voxels wide (along the shortest
+/// tissue 35 at 0.58, a fluid core 5 at 0.22. The edges are 3 voxels wide (along the shortest
 /// axis); g is white on the voxels, smooth between them, with standard deviation 1 and at most 3.46
 /// in magnitude.
 #[derive(Clone, Debug)]
@@ -104,6 +104,7 @@ impl Field for Shells {
 /// half the smaller of its x and y extents, h that half in voxels, and S the quintic smooth step:
 ///
 /// `solid = S(1/2 + 2 (o + 1/4) + 0.3 r) S(1/2 + (0.92 - d) h / 4)`
+///
 /// `f = 60 + 110 solid + 5 r + noise g(p)`
 ///
 /// g is white on the voxels, smooth between them, with standard deviation 1 and at most 3.46 in

@@ -6,7 +6,7 @@ use crate::noise::Octaves;
 
 /// The density of two fluids that mix, the heavy one (3) above the light one (1), as in simulations
 /// of the Rayleigh-Taylor instability: a folded interface of many scales that fills most of the
-/// volume, with plateaus at its ends.
+/// volume, with plateaus where a fluid is pure.
 ///
 /// With h in [-1, 1] from the bottom to the top voxel along z, o(p) octaves of gradient noise of
 /// root mean square 1, and S the quintic smooth step:

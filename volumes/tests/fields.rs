@@ -204,3 +204,29 @@ fn degenerate_dimensions_give_finite_samples() {
         }
     }
 }
+
+/// FNV-1a over the bits of all samples.
+fn checksum(samples: &[f32]) -> u64 {
+    samples.iter().flat_map(|v| v.to_le_bytes()).fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
+    })
+}
+
+#[test]
+fn samples_have_the_same_bits_on_every_platform() {
+    let found: Vec<(&str, u64)> = NAMES
+        .iter()
+        .map(|name| (*name, checksum(&samples(&*by_name(name, DIMS).unwrap(), DIMS))))
+        .collect();
+    assert_eq!(found, CHECKSUMS);
+}
+
+const CHECKSUMS: [(&str, u64); 7] = [
+    ("sphere", 0xf387_3c9f_0460_08c5),
+    ("plane", 0x4712_0522_6624_8437),
+    ("marschner-lobb", 0xc95b_6947_d5fb_ef6d),
+    ("gyroid", 0x309e_347b_69f0_a115),
+    ("shells", 0x9a62_279d_3cda_ee9e),
+    ("turbulence", 0x9bff_17da_2aa7_ed7e),
+    ("rough-solid", 0xf6a1_73e7_58f7_150a),
+];
