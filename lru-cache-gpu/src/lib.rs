@@ -1,1 +1,14 @@
-//! A budgeted cache of decoded blocks on the GPU: slots, directory, de-duplicated requests, eviction by age, guaranteed progress.
+#![doc = include_str!("../README.md")]
+
+mod buffers;
+pub mod cpu;
+mod error;
+mod plan;
+mod service;
+pub mod wgsl;
+
+pub use buffers::CacheBuffers;
+pub use error::Error;
+pub use gpu_primitives::wgpu;
+pub use plan::{CachePlan, LruParams, MAX_PAGES, SLOT_BYTES};
+pub use service::{Counters, Service};

@@ -1,0 +1,24 @@
+// Samples of resident blocks. The importing text declares lru_slots_0 and, with the constants
+// LRU_PAGES_2 and LRU_PAGES_3, lru_slots_1 and lru_slots_2, each
+//   var<storage, read> lru_slots_0: array<f32>;
+// and fn lru_slots_per_page() -> u32.
+
+// Sample x + 4y + 16z of the block in `slot`.
+fn lru_sample(slot: u32, offset: u32) -> f32 {
+#ifdef LRU_PAGES_2
+    let per_page = lru_slots_per_page();
+    let page = slot / per_page;
+    let index = (slot - page * per_page) * 64u + offset;
+    if (page == 0u) {
+        return lru_slots_0[index];
+    }
+#ifdef LRU_PAGES_3
+    if (page == 2u) {
+        return lru_slots_2[index];
+    }
+#endif
+    return lru_slots_1[index];
+#else
+    return lru_slots_0[slot * 64u + offset];
+#endif
+}

@@ -1,0 +1,146 @@
+//! Memory of one cache.
+
+use gpu_primitives::compact::{Compact, CompactBuffers};
+use gpu_primitives::memory::{Buffer, Category, Ledger};
+use gpu_primitives::wgpu;
+
+use crate::plan::{ARGS_BYTES, CONTROL_BYTES, CachePlan, LruParams, SLOT_BYTES};
+use crate::service::{FinishParams, Service};
+
+/// Slots, directory, requests and scratch memory of one cache.
+#[derive(Debug)]
+pub struct CacheBuffers {
+    pub(crate) plan: CachePlan,
+    pub(crate) slots: Vec<Buffer>,
+    pub(crate) directory: Buffer,
+    pub(crate) state: Buffer,
+    pub(crate) jobs: Buffer,
+    pub(crate) control: Buffer,
+    pub(crate) decode_args: Buffer,
+    pub(crate) compact: CompactBuffers,
+    pub(crate) binds: Binds,
+    _scratch: Vec<Buffer>,
+}
+
+/// One bind group per kernel.
+#[derive(Debug)]
+pub(crate) struct Binds {
+    pub(crate) begin_frame: wgpu::BindGroup,
+    pub(crate) lead: wgpu::BindGroup,
+    pub(crate) search: wgpu::BindGroup,
+    pub(crate) assign: wgpu::BindGroup,
+    pub(crate) finish: wgpu::BindGroup,
+}
+
+impl CacheBuffers {
+    /// Allocates an empty cache. `jobs_per_group` is how many jobs one workgroup of the decode
+    /// dispatch takes.
+    pub fn new(
+        device: &wgpu::Device,
+        ledger: &Ledger,
+        service: &Service,
+        plan: &CachePlan,
+        jobs_per_group: u32,
+    ) -> Self {
+        use wgpu::BufferUsages as Usage;
+        let buffer = |category, label, size, usage| {
+            let label = Some(label);
+            let desc = wgpu::BufferDescriptor { label, size, usage, mapped_at_creation: false };
+            ledger.buffer(device, category, &desc)
+        };
+        let storage = Usage::STORAGE | Usage::COPY_SRC;
+        let scratch =
+            |label, size| buffer(Category::Scratch, label, size, storage | Usage::COPY_DST);
+        let slots = plan
+            .pages()
+            .map(|count| buffer(Category::Slots, "lru.slots", count * SLOT_BYTES, storage))
+            .collect();
+        let directory =
+            buffer(Category::Directory, "lru.directory", plan.block_directory_bytes(), storage);
+        let state = buffer(Category::Directory, "lru.state", plan.state_bytes(), storage);
+        let jobs = scratch("lru.jobs", 8 * plan.job_capacity());
+        let args_usage = storage | Usage::INDIRECT;
+        let control = buffer(Category::Scratch, "lru.control", CONTROL_BYTES, args_usage);
+        let decode_args = buffer(Category::Scratch, "lru.decode_args", ARGS_BYTES, args_usage);
+        let is_victim = scratch("lru.is_victim", 4 * plan.window_capacity());
+        let searched = scratch("lru.searched", 4 * plan.window_capacity());
+        let victims = scratch("lru.victims", 4 * plan.window_capacity());
+        let victim_count = scratch("lru.victim_count", ARGS_BYTES);
+        let compact = CompactBuffers::new(
+            device,
+            ledger,
+            &service.compact,
+            &Compact::plan(plan.window_capacity()),
+            &is_victim,
+            &searched,
+            (&control, 12),
+            &victims,
+            (&victim_count, 0),
+        );
+        let uniform = |label, bytes: &[u8]| {
+            ledger.buffer_with(device, Category::Params, label, Usage::UNIFORM, bytes)
+        };
+        let lru = plan.params();
+        let params = uniform("lru.params", bytemuck::bytes_of::<LruParams>(&lru));
+        let finish_params = FinishParams::new(lru, jobs_per_group);
+        let finish_params = uniform("lru.finish_params", bytemuck::bytes_of(&finish_params));
+        let bind = |kernel: &gpu_primitives::kernel::Kernel, params: &Buffer, rest: &[&Buffer]| {
+            let resources: Vec<_> = [params, &directory, &state]
+                .into_iter()
+                .chain(rest.iter().copied())
+                .map(|b| b.as_entire_binding())
+                .collect();
+            kernel.bind(device, "lru", &resources)
+        };
+        let kernels = &service.kernels;
+        let binds = Binds {
+            begin_frame: bind(&kernels.begin_frame, &params, &[]),
+            lead: bind(&kernels.lead, &params, &[&jobs, &control]),
+            search: bind(&kernels.search, &params, &[&control, &is_victim, &searched]),
+            assign: bind(&kernels.assign, &params, &[&victims, &victim_count, &jobs]),
+            finish: bind(
+                &kernels.finish,
+                &finish_params,
+                &[&control, &victims, &victim_count, &decode_args],
+            ),
+        };
+        let _scratch = vec![is_victim, searched, victims, victim_count, params, finish_params];
+        let plan = plan.clone();
+        Self { plan, slots, directory, state, jobs, control, decode_args, compact, binds, _scratch }
+    }
+
+    /// The plan these buffers were made from.
+    pub fn plan(&self) -> &CachePlan {
+        &self.plan
+    }
+
+    /// Pages of slots: sample `x + 4y + 16z` of slot `s` of a page at `64 s + ..`.
+    pub fn slots(&self) -> &[Buffer] {
+        &self.slots
+    }
+
+    /// One u32 per block: 0 absent, 1 requested, otherwise the slot + 2.
+    pub fn directory(&self) -> &wgpu::Buffer {
+        &self.directory
+    }
+
+    /// Header, owners, stamps and requests, as laid out in `shader/lib/lru_state.wgsl`.
+    pub fn state(&self) -> &wgpu::Buffer {
+        &self.state
+    }
+
+    /// (block, slot) pairs to decode after a service.
+    pub fn jobs(&self) -> &wgpu::Buffer {
+        &self.jobs
+    }
+
+    /// Where the number of jobs is: a u32 at this byte offset of [`CacheBuffers::state`].
+    pub fn job_count(&self) -> (&wgpu::Buffer, u64) {
+        (&self.state, 4 * crate::service::JOB_COUNT_WORD)
+    }
+
+    /// Arguments of the decode dispatch, three u32 at offset 0.
+    pub fn decode_args(&self) -> &wgpu::Buffer {
+        &self.decode_args
+    }
+}
