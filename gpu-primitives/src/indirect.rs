@@ -70,7 +70,7 @@ impl IndirectArgs {
             bindings: vec![
                 Binding::Uniform { bytes: Self::BIND_BYTES },
                 Binding::StorageRead { min_bytes: 4 },
-                Binding::StorageReadWrite { min_bytes: ARGS_BYTES },
+                Binding::StorageReadWrite { min_bytes: 4 },
             ],
         }
     }
