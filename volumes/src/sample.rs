@@ -57,9 +57,10 @@ pub fn samples(field: &(impl Field + ?Sized), dims: [u32; 3]) -> Vec<f32> {
     samples
 }
 
-/// Samples a field block by block into a fixed-rate stream of `rate` bits per voxel. Beside the
-/// stream itself it needs a few MiB, whatever the size of the volume. Several threads sample where
-/// there are cores for them; the stream does not depend on their number.
+/// Samples a field block by block into a fixed-rate stream of `rate` bits per voxel: the samples of
+/// the whole volume never exist at once, so that 1024^3 voxels at rate 1 take 270 MB (the stream
+/// and one copy of it while the encoder finishes). Several threads sample where there are cores for
+/// them; the stream does not depend on their number.
 ///
 /// # Errors
 /// [`volume_io::Error::Dims`], [`volume_io::Error::Rate`], or what
