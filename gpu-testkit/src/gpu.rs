@@ -8,6 +8,10 @@ use wgpu::util::DeviceExt as _;
 /// Environment variable that selects an adapter: a substring of its name, case ignored.
 pub const ADAPTER_VARIABLE: &str = "PROGRESSIVE_ISO_ADAPTER";
 
+/// What [`find_adapter`] says when there is no adapter at all.
+pub const NO_ADAPTER: &str = "no GPU adapter with WebGPU's default limits found: install a Vulkan driver \
+                          (Debian/Ubuntu: apt-get install mesa-vulkan-drivers)";
+
 static ADAPTER: OnceLock<wgpu::Adapter> = OnceLock::new();
 
 /// A fresh device with WebGPU's default limits and no features, on the process-wide adapter.
@@ -55,21 +59,29 @@ pub fn adapter_info() -> wgpu::AdapterInfo {
 /// The adapter that every device of this process uses.
 ///
 /// # Panics
-/// When there is no adapter, or none has the name asked for in [`ADAPTER_VARIABLE`].
+/// With the error of [`find_adapter`].
 #[must_use]
 pub fn adapter() -> &'static wgpu::Adapter {
-    ADAPTER.get_or_init(|| {
-        let wanted = std::env::var(ADAPTER_VARIABLE).unwrap_or_default();
-        let adapters = adapters();
-        let names: Vec<String> = adapters.iter().map(|a| a.get_info().name).collect();
-        match adapters.into_iter().find(|a| name_matches(&a.get_info().name, &wanted)) {
-            Some(adapter) => adapter,
-            None if names.is_empty() => panic!(
-                "no GPU adapter found: install a Vulkan driver (Debian/Ubuntu: apt-get install mesa-vulkan-drivers)"
-            ),
-            None => panic!("no adapter matches {ADAPTER_VARIABLE}={wanted}; found {names:?}"),
-        }
+    ADAPTER.get_or_init(|| match find_adapter() {
+        Ok(adapter) => adapter,
+        Err(problem) => panic!("{problem}"),
     })
+}
+
+/// The best adapter that offers WebGPU's default limits and whose name contains the value of
+/// [`ADAPTER_VARIABLE`], if that is set.
+///
+/// # Errors
+/// One line that says what was found instead, or what to install when nothing was found.
+pub fn find_adapter() -> Result<wgpu::Adapter, String> {
+    let wanted = std::env::var(ADAPTER_VARIABLE).unwrap_or_default();
+    let adapters = adapters();
+    let names: Vec<String> = adapters.iter().map(|a| a.get_info().name).collect();
+    match adapters.into_iter().find(|a| name_matches(&a.get_info().name, &wanted)) {
+        Some(adapter) => Ok(adapter),
+        None if names.is_empty() => Err(NO_ADAPTER.to_owned()),
+        None => Err(format!("no GPU adapter matches {ADAPTER_VARIABLE}={wanted}; found {names:?}")),
+    }
 }
 
 fn name_matches(name: &str, wanted: &str) -> bool {
@@ -88,6 +100,7 @@ fn adapters_of(backends: wgpu::Backends) -> Vec<wgpu::Adapter> {
     descriptor.backends &= backends;
     let instance = wgpu::Instance::new(descriptor);
     let mut found = pollster::block_on(instance.enumerate_adapters(backends));
+    found.retain(|adapter| wgpu::Limits::default().check_limits(&adapter.limits()));
     found.sort_by_key(|adapter| type_rank(adapter.get_info().device_type));
     found
 }

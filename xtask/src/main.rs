@@ -1,0 +1,71 @@
+//! Set-up, tests and demo in one command each: `cargo xtask demo|test|msrv|adapter`.
+#![expect(clippy::print_stdout, clippy::print_stderr, reason = "a command-line program")]
+
+mod adapter;
+mod msrv;
+mod process;
+
+use std::process::ExitCode;
+
+const USAGE: &str = "\
+usage: cargo xtask COMMAND
+
+  demo [ARGUMENTS]  make sure that there is a GPU adapter, then render the example to out/demo
+                    (further arguments go to the example)
+  test [ARGUMENTS]  make sure that there is a GPU adapter, then run every test, on SwiftShader too
+                    where it is found (further arguments go to both runs of cargo test)
+  msrv              check that no dependency of a published crate needs a newer Rust
+  adapter           print the GPU adapter that demo and test use
+
+The environment variable PROGRESSIVE_ISO_ADAPTER selects an adapter by a part of its name.";
+
+fn main() -> ExitCode {
+    let mut arguments = std::env::args().skip(1);
+    let command = arguments.next().unwrap_or_default();
+    let rest: Vec<String> = arguments.collect();
+    let result = match (command.as_str(), rest.as_slice()) {
+        ("demo", _) => demo(&rest),
+        ("test", _) => test(&rest),
+        ("msrv", []) => msrv::check(),
+        ("adapter", []) => adapter::describe().map(|description| println!("{description}")),
+        _ => {
+            eprintln!("{USAGE}");
+            return ExitCode::from(2);
+        }
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(problem) => {
+            eprintln!("xtask: {problem}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn demo(arguments: &[String]) -> Result<(), String> {
+    println!("adapter: {}", adapter::ensure()?);
+    let mut cargo = process::cargo();
+    cargo.args(["run", "--example", "quickstart", "--"]);
+    if !arguments.iter().any(|argument| argument == "--out" || argument.starts_with("--out=")) {
+        cargo.args(["--out", "out/demo"]);
+    }
+    process::run(cargo.args(arguments))
+}
+
+fn test(arguments: &[String]) -> Result<(), String> {
+    let first = adapter::ensure()?;
+    println!("adapter: {first}");
+    process::run(process::cargo().args(["test", "--workspace"]).args(arguments))?;
+    if adapter::is_swiftshader(&first) {
+        return Ok(());
+    }
+    let Some(icd) = adapter::swiftshader_icd() else {
+        println!("{}", adapter::NO_SECOND_DRIVER);
+        return Ok(());
+    };
+    println!("second adapter: {}", adapter::describe_in_child(&adapter::only(&icd))?);
+    // Documentation tests bring nothing new on another driver.
+    let mut cargo = process::cargo();
+    cargo.args(["test", "--workspace", "--tests"]).args(arguments);
+    process::run(cargo.envs(adapter::only(&icd)))
+}

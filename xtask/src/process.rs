@@ -1,0 +1,44 @@
+//! Child processes.
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+/// The cargo that runs this program, in the root of the workspace.
+pub(crate) fn cargo() -> Command {
+    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    if let Some(root) = Path::new(env!("CARGO_MANIFEST_DIR")).parent() {
+        command.current_dir(root);
+    }
+    command
+}
+
+/// Runs a command that shares this program's output; anything but success is an error.
+pub(crate) fn run(command: &mut Command) -> Result<(), String> {
+    match command.status() {
+        Ok(status) if status.success() => Ok(()),
+        Ok(status) => Err(format!("{} failed: {status}", line(command))),
+        Err(error) => Err(format!("{} did not start: {error}", line(command))),
+    }
+}
+
+/// Runs a command and returns what it writes to standard output.
+pub(crate) fn output(command: &mut Command) -> Result<Vec<u8>, String> {
+    match command.stderr(Stdio::inherit()).output() {
+        Ok(output) if output.status.success() => Ok(output.stdout),
+        Ok(output) => Err(format!("{} failed: {}", line(command), output.status)),
+        Err(error) => Err(format!("{} did not start: {error}", line(command))),
+    }
+}
+
+/// Whether a command runs and succeeds; its output is dropped.
+pub(crate) fn succeeds(program: &str, arguments: &[&str]) -> bool {
+    let mut command = Command::new(program);
+    command.args(arguments).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    command.status().is_ok_and(|status| status.success())
+}
+
+fn line(command: &Command) -> String {
+    let program = Path::new(command.get_program()).file_name().unwrap_or_default();
+    let words = std::iter::once(program).chain(command.get_args());
+    words.map(|word| word.to_string_lossy()).collect::<Vec<_>>().join(" ")
+}
