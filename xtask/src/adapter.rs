@@ -34,8 +34,14 @@ pub(crate) fn describe() -> Result<String, String> {
 pub(crate) fn describe_in_child(variables: &[(&str, OsString)]) -> Result<String, String> {
     let program = std::env::current_exe().map_err(|error| format!("own path unknown: {error}"))?;
     let mut command = Command::new(program);
-    let output = process::output(command.arg("adapter").envs(variables.iter().cloned()))?;
-    Ok(String::from_utf8_lossy(&output).trim().to_owned())
+    let output = command.arg("adapter").envs(variables.iter().cloned()).output();
+    let output = output.map_err(|error| format!("own program did not start: {error}"))?;
+    if output.status.success() {
+        return Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned());
+    }
+    let message = String::from_utf8_lossy(&output.stderr);
+    let last = message.lines().last().unwrap_or("looking for a GPU adapter failed");
+    Err(last.trim_start_matches(crate::ERROR_PREFIX).to_owned())
 }
 
 /// [`describe`], after installing a software driver where there is no adapter and the system

@@ -7,6 +7,8 @@ mod process;
 
 use std::process::ExitCode;
 
+const ERROR_PREFIX: &str = "xtask: ";
+
 const USAGE: &str = "\
 usage: cargo xtask COMMAND
 
@@ -36,7 +38,7 @@ fn main() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(problem) => {
-            eprintln!("xtask: {problem}");
+            eprintln!("{ERROR_PREFIX}{problem}");
             ExitCode::FAILURE
         }
     }
