@@ -14,6 +14,10 @@
 //! # }
 //! ```
 
+#[cfg(all(doctest, feature = "nifti"))]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod convert;
 mod encode;
 mod error;

@@ -114,6 +114,8 @@ impl ZfpVolume {
 
     /// All samples as libzfp decodes them, x-fastest. Needs four bytes per voxel: meant for tests
     /// and small volumes; [`ZfpVolume::decoded_blocks`] needs no such buffer.
+    ///
+    /// Unlike on the GPU, blocks of tiny magnitude ([`TINY_EXPONENT`]) keep their values.
     #[must_use]
     pub fn decode(&self) -> Vec<f32> {
         let [nx, ny, _] = self.dims.map(|n| n as usize);

@@ -53,7 +53,11 @@ fn case() -> impl Strategy<Value = ([u32; 3], f64, Vec<f32>)> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(128))]
+    #![proptest_config(ProptestConfig {
+        cases: 128,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
 
     #[test]
     fn stream_and_decoded_samples_are_those_of_libzfp((dims, rate, samples) in case()) {
