@@ -77,7 +77,8 @@ impl StreamLayout {
         self.blocks().iter().fold(1, |product: u64, &n| product.saturating_mul(u64::from(n)))
     }
 
-    /// Least number of bytes that hold the stream, header included (files are padded to 8 bytes).
+    /// Least number of bytes that hold the stream, header included. Files are
+    /// padded to 1 to 8 bytes, depending on how zfp was built.
     pub fn stream_bytes(&self) -> u64 {
         self.block_bit(self.block_count()).div_ceil(8)
     }

@@ -122,6 +122,23 @@ fn the_comparison_can_fail() {
     assert_same_bits(&[1.0, 0.0], &[1.0, -0.0], "signs of zero");
 }
 
+#[test]
+fn readers_stay_within_one_word_of_the_block() {
+    for bits_per_block in bit_counts() {
+        let layout = StreamLayout::new([12, 4, 4], bits_per_block, 17).unwrap();
+        let plain = encode(&field(Kind::Noise, layout.dims, 8), layout.dims, bits_per_block);
+        let stream = behind_header(&plain, &layout, &mut Random::new(2));
+        let end = layout.block_bit(3).div_ceil(32);
+        let word = |index: u64| {
+            assert!(index <= end + 1, "word {index} of {end}");
+            let bytes = (index * 4..index * 4 + 4).map(|i| stream.get(i as usize).unwrap_or(&0));
+            bytes.rev().fold(0, |word, &byte| word << 8 | u32::from(byte))
+        };
+        let values = decode_words(word, layout.block_bit(2), bits_per_block);
+        assert_same_bits(&values, &decode_block(&stream, &layout, 2), "last block");
+    }
+}
+
 fn any_kind() -> impl Strategy<Value = Kind> {
     proptest::sample::select(KINDS.to_vec())
 }

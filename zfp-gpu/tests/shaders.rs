@@ -1,11 +1,10 @@
-//! Every shader parses, validates without optional capabilities, and declares what the Rust side
-//! binds.
+//! Every shader validates against core WebGPU and its default limits, and declares what the Rust
+//! side binds.
 
 #![allow(clippy::unwrap_used, reason = "a failed set-up fails the test")]
 
 use gpu_primitives::kernel::{Binding, KernelSource};
-use naga::valid::{Capabilities, ValidationFlags, Validator};
-use naga::{AddressSpace, Module, StorageAccess, TypeInner};
+use gpu_testkit::layout::{BindingKind, check_bindings, check_struct, validate_wgsl};
 use zfp_gpu::{BlockExtrema, Decode};
 
 fn sources() -> Vec<KernelSource> {
@@ -13,57 +12,36 @@ fn sources() -> Vec<KernelSource> {
     decodes.chain([BlockExtrema::source()]).collect()
 }
 
-fn parse(source: &KernelSource) -> Module {
-    let text = &source.wgsl.source;
-    let module = naga::front::wgsl::parse_str(text)
-        .unwrap_or_else(|error| panic!("{}", error.emit_to_string(text)));
-    Validator::new(ValidationFlags::all(), Capabilities::empty())
-        .validate(&module)
-        .unwrap_or_else(|error| panic!("{}", error.emit_to_string(text)));
-    module
+fn kind(binding: &Binding) -> BindingKind {
+    match *binding {
+        Binding::Uniform { bytes } => BindingKind::Uniform { bytes },
+        Binding::StorageRead { min_bytes } => BindingKind::StorageRead { min_bytes },
+        Binding::StorageReadWrite { min_bytes } => BindingKind::StorageReadWrite { min_bytes },
+        ref other => panic!("unexpected {other:?}"),
+    }
 }
 
-/// Binding kinds of group 0 as the shader declares them, with the bytes that it needs at least.
-fn declared(module: &Module) -> Vec<Binding> {
-    let mut found: Vec<(u32, Binding)> = Vec::new();
-    for (_, variable) in module.global_variables.iter() {
-        let Some(binding) = &variable.binding else { continue };
-        assert_eq!(binding.group, 0, "kernels use group 0 only");
-        let inner = &module.types[variable.ty].inner;
-        let bytes = match *inner {
-            TypeInner::Array { stride, .. } => u64::from(stride),
-            TypeInner::Struct { span, .. } => u64::from(span),
-            ref other => panic!("unexpected type {other:?}"),
-        };
-        let kind = match variable.space {
-            AddressSpace::Uniform => Binding::Uniform { bytes },
-            AddressSpace::Storage { access } if access.contains(StorageAccess::STORE) => {
-                Binding::StorageReadWrite { min_bytes: bytes }
-            }
-            AddressSpace::Storage { .. } => Binding::StorageRead { min_bytes: bytes },
-            other => panic!("unexpected address space {other:?}"),
-        };
-        found.push((binding.binding, kind));
+#[test]
+fn shaders_are_valid_under_default_limits() {
+    for source in sources() {
+        validate_wgsl(&source.wgsl.source).unwrap();
     }
-    found.sort_by_key(|entry| entry.0);
-    assert!((0..).zip(&found).all(|(i, entry)| i == entry.0), "bindings are numbered from 0");
-    found.into_iter().map(|entry| entry.1).collect()
 }
 
 #[test]
 fn shaders_declare_what_is_bound() {
     for source in sources() {
-        let module = parse(&source);
-        assert_eq!(declared(&module), source.bindings, "{}", source.label);
-        let storage = |b: &&Binding| !matches!(b, Binding::Uniform { .. });
-        assert!(source.bindings.iter().filter(storage).count() <= 8, "{}", source.label);
+        let kinds: Vec<_> = source.bindings.iter().map(kind).collect();
+        check_bindings(&source.wgsl.source, source.entry_point, &kinds).unwrap();
+        let short = &kinds[..kinds.len() - 1];
+        check_bindings(&source.wgsl.source, source.entry_point, short).unwrap_err();
     }
 }
 
 #[test]
 fn entry_points_have_the_announced_group_size() {
     for source in sources() {
-        let module = parse(&source);
+        let module = naga::front::wgsl::parse_str(&source.wgsl.source).unwrap();
         let names: Vec<_> = module.entry_points.iter().map(|e| e.name.as_str()).collect();
         assert_eq!(names, [source.entry_point]);
         assert_eq!(module.entry_points[0].workgroup_size, [Decode::JOBS_PER_GROUP, 1, 1]);
@@ -72,21 +50,17 @@ fn entry_points_have_the_announced_group_size() {
 
 #[test]
 fn parameters_lie_where_the_host_writes_them() {
-    let offsets = |module: &Module, name: &str| -> Vec<(String, u32)> {
-        let (_, ty) = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name)).unwrap();
-        let TypeInner::Struct { members, .. } = &ty.inner else { panic!("{name} is a struct") };
-        members.iter().map(|m| (m.name.clone().unwrap(), m.offset)).collect()
-    };
-    let in_words = |names: &[&str], words: u32| -> Vec<(String, u32)> {
-        (0..).zip(names).map(|(i, n)| ((*n).to_owned(), i * words * 4)).collect()
-    };
-    let decode = parse(&Decode::source(3).unwrap());
-    let page = ["first_block", "blocks", "bits_per_block", "first_bit"];
-    assert_eq!(offsets(&decode, "ZfpPage"), in_words(&page, 1));
-    let params = ["slots_per_page", "slots", "count_word", "padding"];
-    assert_eq!(offsets(&decode, "DecodeParams"), in_words(&params, 1));
-    let extrema = parse(&BlockExtrema::source());
-    assert_eq!(offsets(&extrema, "ExtremaParams"), in_words(&["origin", "size", "dims"], 4));
+    let decode = Decode::source(3).unwrap().wgsl.source;
+    let page =
+        [("first_block", 0, 4), ("blocks", 4, 4), ("bits_per_block", 8, 4), ("first_bit", 12, 4)];
+    check_struct(&decode, "ZfpPage", &page).unwrap();
+    let params =
+        [("slots_per_page", 0, 4), ("slots", 4, 4), ("count_word", 8, 4), ("padding", 12, 4)];
+    check_struct(&decode, "DecodeParams", &params).unwrap();
+    let extrema = BlockExtrema::source().wgsl.source;
+    check_struct(&extrema, "ZfpPage", &page).unwrap();
+    let params = [("origin", 0, 16), ("size", 16, 16), ("dims", 32, 16)];
+    check_struct(&extrema, "ExtremaParams", &params).unwrap();
 }
 
 #[test]

@@ -57,7 +57,9 @@ pub fn region_extrema(
         for y in 0..size[1] {
             for x in 0..size[0] {
                 let Some(element) = elements.next() else { return };
-                let block = [origin[0] + x, origin[1] + y, origin[2] + z];
+                // Saturated coordinates are outside any volume.
+                let block =
+                    [(0, x), (1, y), (2, z)].map(|(axis, i)| origin[axis].saturating_add(i));
                 if (0..3).all(|axis| block[axis] < blocks[axis]) {
                     element.copy_from_slice(&block_extrema(stream, layout, block));
                 }

@@ -1,6 +1,9 @@
 //! Fields that exercise every path of the codec, and an independent encoder and decoder.
 
 #![allow(dead_code, reason = "every test binary uses its own part")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up fails the test")]
+
+pub(crate) mod gpu;
 
 use zfp_gpu::StreamLayout;
 use zfp_rs::codec::block::{decode_block, encode_block};
