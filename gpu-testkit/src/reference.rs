@@ -84,6 +84,17 @@ pub struct Trace {
     pub silhouette_distance: f64,
 }
 
+impl Trace {
+    /// Whether arithmetic of lower precision may rightly find another hit, or none: an extremum
+    /// comes within `relative` times [`Trace::max_abs`] of the isovalue, or the ray within
+    /// `distance` voxels of the box's silhouette. Tests that compare cells look at
+    /// [`Trace::edge_distance`] and [`Hit::face_distance`] too.
+    #[must_use]
+    pub fn is_ambiguous(&self, relative: f64, distance: f64) -> bool {
+        self.turning_margin <= relative * self.max_abs || self.silhouette_distance.abs() <= distance
+    }
+}
+
 /// A volume and an isovalue to trace.
 #[derive(Clone, Debug)]
 pub struct Scene<'a> {

@@ -186,6 +186,9 @@ fn margins_tell_near_misses() {
     assert!((grazed.turning_margin - 1e-7).abs() < 1e-12, "the peak comes after the hit");
     let clear = Scene::new(dims, &samples, 0.2).trace(&ray);
     assert!((clear.turning_margin - 0.2).abs() < 1e-12);
+    assert!(missed.is_ambiguous(1e-6, 0.0) && grazed.is_ambiguous(1e-6, 0.0));
+    assert!(!clear.is_ambiguous(1e-6, 0.1));
+    assert!(clear.is_ambiguous(1e-6, 0.6), "half a voxel is as deep as one cell goes");
 }
 
 #[test]
