@@ -34,7 +34,8 @@ pub(crate) fn describe() -> Result<String, String> {
 pub(crate) fn describe_in_child(variables: &[(&str, OsString)]) -> Result<String, String> {
     let program = std::env::current_exe().map_err(|error| format!("own path unknown: {error}"))?;
     let mut command = Command::new(program);
-    let output = command.arg("adapter").envs(variables.iter().cloned()).output();
+    command.arg("adapter").envs(process::headless()).envs(variables.iter().cloned());
+    let output = command.output();
     let output = output.map_err(|error| format!("own program did not start: {error}"))?;
     if output.status.success() {
         return Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned());
@@ -47,7 +48,7 @@ pub(crate) fn describe_in_child(variables: &[(&str, OsString)]) -> Result<String
 /// [`describe`], after installing a software driver where there is no adapter and the system
 /// allows it.
 pub(crate) fn ensure() -> Result<String, String> {
-    let problem = match describe() {
+    let problem = match describe_in_child(&[]) {
         Ok(description) => return Ok(description),
         Err(problem) => problem,
     };

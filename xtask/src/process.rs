@@ -9,7 +9,14 @@ pub(crate) fn cargo() -> Command {
     if let Some(root) = Path::new(env!("CARGO_MANIFEST_DIR")).parent() {
         command.current_dir(root);
     }
+    command.envs(headless());
     command
+}
+
+/// Without a desktop session, Mesa's device selection layer writes an error for every adapter that
+/// is opened, though nothing is wrong: this environment leaves the layer out there.
+pub(crate) fn headless() -> Option<(&'static str, &'static str)> {
+    std::env::var_os("XDG_RUNTIME_DIR").is_none().then_some(("NODEVICE_SELECT", "1"))
 }
 
 /// Runs a command that shares this program's output; anything but success is an error.
