@@ -1,6 +1,6 @@
 #!/bin/sh
 # Makes the reference streams in this folder with the `zfp` program (written with version 1.0.0):
-# NAME.raw holds the f32 samples, NAME.zfp the stream, NAME.out what `zfp` decodes from it.
+# NAME.zfp holds the stream, NAME.out the f32 samples that `zfp` decodes from it.
 # Samples come from integer arithmetic only, so that every machine makes the same files.
 set -eu
 cd "$(dirname "$0")"
@@ -44,5 +44,5 @@ make noise_r33_header noise 10 11 7 33.125 -h
 make mixed_r0.2_header mixed 14 13 12 0.2 -h
 make mixed_r4.7 mixed 14 13 12 4.7 ""
 make mixed_r20_header mixed 14 13 12 20 -h
-# The samples themselves are not compared: the streams and their decoded values are.
+# The original samples are not needed: streams are compared by what they decode to.
 rm ./*.raw
