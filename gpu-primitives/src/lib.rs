@@ -15,3 +15,8 @@ pub mod readback;
 pub mod scan;
 pub mod upload;
 pub mod wgsl;
+
+/// Compiles the example of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

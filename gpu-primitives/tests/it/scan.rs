@@ -2,6 +2,7 @@ use crate::{device, encoder, first_difference, words};
 use gpu_primitives::cpu;
 use gpu_primitives::memory::Ledger;
 use gpu_primitives::scan::{Scan, ScanBuffers};
+use gpu_primitives::upload::UploadRing;
 use gpu_testkit::gpu;
 use proptest::prelude::*;
 use std::sync::OnceLock;
@@ -97,4 +98,30 @@ proptest! {
     fn agrees_with_the_twin(data in prop::collection::vec(any::<u32>(), 0..5000), part in 0.0..=1.2) {
         check(&data, (data.len() as f64 * part) as u32);
     }
+}
+
+#[test]
+fn buffers_serve_many_counts_in_one_recording() {
+    const COUNTS: [u32; 4] = [2 * GROUP as u32 + 9, 0, 7, GROUP as u32 + 1];
+    let (device, queue) = device();
+    let ledger = Ledger::new();
+    let data = words(device, &mixed(2 * GROUP + 9));
+    let count = words(device, &[0]);
+    let totals = gpu::sentinel_buffer(device, 4 * COUNTS.len() as u64, crate::SENTINEL);
+    let plan = Scan::plan(2 * GROUP as u64 + 9);
+    let buffers = ScanBuffers::new(device, &ledger, stage(), &plan, &data, &count, 0);
+    let mut upload = UploadRing::new(&ledger, "test", 256);
+    let mut encoder = encoder(device);
+    for (place, value) in (0u64..).zip(COUNTS) {
+        upload.write(device, &mut encoder, &count, 0, &value.to_le_bytes());
+        stage().record(&mut encoder, &buffers);
+        encoder.copy_buffer_to_buffer(buffers.total(), 0, &totals, 4 * place, 4);
+    }
+    gpu::submit_and_wait(device, queue, encoder);
+
+    let mut expected = mixed(2 * GROUP + 9);
+    let expected_totals =
+        COUNTS.map(|count| cpu::scan::exclusive_scan(&mut expected[..count as usize]));
+    assert_eq!(gpu::read_u32s(device, queue, &totals), expected_totals);
+    assert_eq!(first_difference(&gpu::read_u32s(device, queue, &data), &expected), None);
 }
