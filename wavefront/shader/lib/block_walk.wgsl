@@ -1,0 +1,88 @@
+// A ray's way through the dual cells of one block whose samples are resident. Needs lru_sample.
+#import cell
+
+// Slots of the block (0) and its plus-side neighbours: bit 0 +x, bit 1 +y, bit 2 +z.
+var<private> block_slots: array<u32, 8>;
+
+struct BlockWalk {
+    hit: bool,
+    place: MacrocellPlace, // the hit's cell and how it was entered, or the first cell after the block
+    exit: DdaEvent,        // where the ray leaves the hit's cell
+    corners: CellCorners,  // of the hit's cell
+    bernstein: vec4<f32>,
+    bracket: CellBracket,
+    inside_low: bool,
+}
+
+// Which neighbours' samples the cells that the ray visits in `box` need, a bit for each of block_slots.
+fn block_need(ray: DdaRay, start: MacrocellPlace, box: DdaBox) -> u32 {
+    var need = 0u;
+    var cell = start.cell;
+    while (all(cell >= box.low) && all(cell <= box.high)) {
+        let upper = (cell & vec3<i32>(3)) == vec3<i32>(3);
+        var mask = 1u;
+        mask |= select(0u, mask << 1u, upper.x);
+        mask |= select(0u, mask << 2u, upper.y);
+        mask |= select(0u, mask << 4u, upper.z);
+        need |= mask;
+        cell = block_next(ray, cell, dda_exit(ray, DdaBox(cell, cell)));
+    }
+    return need;
+}
+
+fn block_next(ray: DdaRay, cell: vec3<i32>, exit: DdaEvent) -> vec3<i32> {
+    var next = cell;
+    next[exit.axis] += select(1, -1, ray.direction[exit.axis] < 0.0);
+    return next;
+}
+
+fn block_sample(x: i32, y: i32, z: i32) -> f32 {
+    let slot = block_slots[(x >> 2u) | ((y >> 2u) << 1u) | ((z >> 2u) << 2u)];
+    return lru_sample(slot, u32((x & 3) | ((y & 3) << 2u) | ((z & 3) << 4u)));
+}
+
+fn block_corners(cell: vec3<i32>, isovalue: f32) -> CellCorners {
+    let l = cell & vec3<i32>(3);
+    let low = vec4<f32>(
+        block_sample(l.x, l.y, l.z), block_sample(l.x, l.y + 1, l.z),
+        block_sample(l.x, l.y, l.z + 1), block_sample(l.x, l.y + 1, l.z + 1),
+    );
+    let high = vec4<f32>(
+        block_sample(l.x + 1, l.y, l.z), block_sample(l.x + 1, l.y + 1, l.z),
+        block_sample(l.x + 1, l.y, l.z + 1), block_sample(l.x + 1, l.y + 1, l.z + 1),
+    );
+    return CellCorners(low - vec4<f32>(isovalue), high - vec4<f32>(isovalue));
+}
+
+fn block_walk(ray: DdaRay, start: MacrocellPlace, box: DdaBox, isovalue: f32) -> BlockWalk {
+    var walk: BlockWalk;
+    walk.place = start;
+    var inside = false;
+    var inside_known = false;
+    while (all(walk.place.cell >= box.low) && all(walk.place.cell <= box.high)) {
+        let cell = walk.place.cell;
+        walk.exit = dda_exit(ray, DdaBox(cell, cell));
+        walk.corners = block_corners(cell, isovalue);
+        if (cell_all_inside(walk.corners)) {
+            inside = true;
+        } else if (cell_all_outside(walk.corners)) {
+            inside = false;
+        } else {
+            walk.bernstein = cell_bernstein(
+                walk.corners,
+                cell_local(ray, walk.place.event, cell),
+                cell_local(ray, walk.exit, cell),
+            );
+            walk.inside_low = select(walk.bernstein.x >= 0.0, inside, inside_known);
+            inside = walk.bernstein.w >= 0.0;
+            walk.bracket = cell_first_crossing(walk.bernstein, walk.inside_low, inside);
+            if (walk.bracket.found) {
+                walk.hit = true;
+                return walk;
+            }
+        }
+        inside_known = true;
+        walk.place = MacrocellPlace(walk.exit, block_next(ray, cell, walk.exit));
+    }
+    return walk;
+}

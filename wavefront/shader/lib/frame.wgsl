@@ -1,0 +1,57 @@
+// One frame's camera and grids, and the rays they make.
+#import macrocell_grid
+#import lru_params
+
+struct FrameParams {
+    // Start of the ray through the image's centre, in index space, and its change per pixel.
+    origin: vec3<f32>,
+    isovalue: f32,
+    origin_dx: vec3<f32>,
+    width: u32,
+    origin_dy: vec3<f32>,
+    height: u32,
+    // Index-space direction per unit of view depth at the image's centre, and its change per pixel.
+    direction: vec3<f32>,
+    start_depth: f32, // view depth of the rays' start, in world units
+    direction_dx: vec3<f32>,
+    pad0: u32,
+    direction_dy: vec3<f32>,
+    pad1: u32,
+    grid: MacrocellGrid,
+    lru: LruParams,
+}
+
+struct FrameRay {
+    ray: DdaRay,         // unit direction: t is in voxels
+    depth_per_voxel: f32, // view depth in world units gained per voxel along the ray
+}
+
+fn frame_ray(frame: FrameParams, pixel: vec2<u32>) -> FrameRay {
+    let offset = vec2<f32>(pixel) + vec2<f32>(0.5) - 0.5 * vec2<f32>(f32(frame.width), f32(frame.height));
+    let origin = frame.origin + offset.x * frame.origin_dx + offset.y * frame.origin_dy;
+    let direction = frame.direction + offset.x * frame.direction_dx + offset.y * frame.direction_dy;
+    let depth_per_voxel = 1.0 / length(direction);
+    return FrameRay(dda_ray(origin, direction * depth_per_voxel), depth_per_voxel);
+}
+
+// Status of a ray in the two upper bits of its state; the others hold its block.
+const RAY_ACTIVE: u32 = 0u;          // waits for its block, or has not started
+const RAY_HIT: u32 = 0x40000000u;    // has a hit in its block, not shaded yet
+const RAY_DONE: u32 = 0x80000000u;   // final
+const RAY_STATUS: u32 = 0xc0000000u;
+const RAY_BLOCK: u32 = 0x3fffffffu;
+
+// Words before the rays' states.
+const RAYS_ACTIVE: u32 = 0u;   // length of the active list
+const RAYS_ENTERED: u32 = 1u;  // rays that enter the volume
+const RAYS_HITS: u32 = 2u;     // hits shaded so far
+const RAYS_HEADER: u32 = 4u;
+
+fn frame_pixel(frame: FrameParams, ray: u32) -> vec2<u32> {
+    return vec2<u32>(ray % frame.width, ray / frame.width);
+}
+
+fn frame_block_position(frame: FrameParams, block: u32) -> vec3<i32> {
+    let size = frame.grid.blocks;
+    return vec3<i32>(vec3<u32>(block % size.x, (block / size.x) % size.y, block / (size.x * size.y)));
+}

@@ -1,0 +1,102 @@
+// Turns every new hit into parameter, normal and colour, and marks which rays stay active. All
+// strategies share this kernel, so that their pictures are equal bit for bit.
+#import frame
+#import indirect
+#import lru_lookup
+#import lru_slots
+#import block_walk
+#import outputs
+
+@group(0) @binding(0) var<uniform> frame: FrameParams;
+@group(0) @binding(1) var<uniform> shading: ShadingParams;
+@group(0) @binding(2) var<storage, read_write> rays: array<atomic<u32>>;
+@group(0) @binding(3) var<storage, read> active_rays: array<u32>;
+@group(0) @binding(4) var<storage, read_write> keep: array<u32>;
+@group(0) @binding(5) var<storage, read> lru_directory: array<u32>;
+@group(0) @binding(6) var<storage, read> lru_slots_0: array<f32>;
+#ifdef LRU_PAGES_2
+@group(0) @binding(7) var<storage, read> lru_slots_1: array<f32>;
+#endif
+#ifdef LRU_PAGES_3
+@group(0) @binding(8) var<storage, read> lru_slots_2: array<f32>;
+#endif
+@group(0) @binding(COLOR_BINDING) var color_out: texture_storage_2d<rgba8unorm, write>;
+#ifdef OUTPUT_DEPTH
+@group(0) @binding(DEPTH_BINDING) var depth_out: texture_storage_2d<r32float, write>;
+#endif
+#ifdef OUTPUT_NORMAL
+@group(0) @binding(NORMAL_BINDING) var normal_out: texture_storage_2d<rgba16float, write>;
+#endif
+#ifdef OUTPUT_STATUS
+@group(0) @binding(STATUS_BINDING) var status_out: texture_storage_2d<r32uint, write>;
+#endif
+
+var<workgroup> hit_count: atomic<u32>;
+
+fn lru_slots_per_page() -> u32 {
+    return frame.lru.slots_per_page;
+}
+
+// Finds the hit again: the first crossing in the block, whose samples are still resident.
+fn hit_in_block(ray: DdaRay, block: vec3<i32>) -> BlockWalk {
+    for (var i = 0u; i < 8u; i++) {
+        let neighbour = block + vec3<i32>(vec3<u32>(i & 1u, (i >> 1u) & 1u, i >> 2u));
+        block_slots[i] = 0u;
+        if (all(vec3<u32>(neighbour) < frame.grid.blocks)) {
+            // A neighbour that the ray's cells do not need may be absent.
+            let slot = lru_lookup(macrocell_linear(neighbour, frame.grid.blocks));
+            block_slots[i] = select(slot, 0u, slot == LRU_MISSING);
+        }
+    }
+    let box = dda_box(block * 4, 2u, frame.grid.last_cell);
+    let entry = dda_entry(ray, box);
+    return block_walk(ray, MacrocellPlace(entry, dda_cell_after(ray, entry, box)), box, frame.isovalue);
+}
+
+fn resolve(id: u32, block: u32) {
+    let pixel = frame_pixel(frame, id);
+    let frame_ray = frame_ray(frame, pixel);
+    let ray = frame_ray.ray;
+    let walk = hit_in_block(ray, frame_block_position(frame, block));
+    let s = cell_root(walk.bernstein, walk.bracket, walk.inside_low);
+    let t = cell_mix(walk.place.event.t, walk.exit.t, s);
+    let low = cell_local(ray, walk.place.event, walk.place.cell);
+    let high = cell_local(ray, walk.exit, walk.place.cell);
+    let gradient = cell_gradient(walk.corners, low * (1.0 - s) + high * s);
+    let along = ray.direction.x * shading.world_x + ray.direction.y * shading.world_y
+        + ray.direction.z * shading.world_z;
+    let to_viewer = -outputs_safe_normalize(along, vec3<f32>(0.0, 0.0, 1.0));
+    let normal = outputs_normal(gradient, to_viewer);
+    let depth = frame.start_depth + t * frame_ray.depth_per_voxel;
+    outputs_write_hit(pixel, outputs_shade(normal, to_viewer), depth, normal);
+}
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    if (lane == 0u) {
+        atomicStore(&hit_count, 0u);
+    }
+    workgroupBarrier();
+    let index = indirect_linear_group(group, groups) * 64u + lane;
+    if (index < atomicLoad(&rays[RAYS_ACTIVE])) {
+        let id = active_rays[index];
+        let state = atomicLoad(&rays[RAYS_HEADER + id]);
+        let status = state & RAY_STATUS;
+        keep[index] = u32(status == RAY_ACTIVE);
+        if (status == RAY_HIT) {
+            resolve(id, state & RAY_BLOCK);
+            atomicStore(&rays[RAYS_HEADER + id], RAY_DONE | RAY_HIT);
+            atomicAdd(&hit_count, 1u);
+        } else if (status == RAY_DONE) {
+            outputs_write_empty(frame_pixel(frame, id), false);
+        }
+    }
+    workgroupBarrier();
+    if (lane == 0u) {
+        atomicAdd(&rays[RAYS_HITS], atomicLoad(&hit_count));
+    }
+}

@@ -1,0 +1,65 @@
+// Starts a frame: every ray's first block, the list of the rays that enter the volume, cleared outputs.
+#import frame
+#import indirect
+#import outputs
+
+@group(0) @binding(0) var<uniform> frame: FrameParams;
+@group(0) @binding(1) var<uniform> shading: ShadingParams;
+@group(0) @binding(2) var<storage, read_write> rays: array<atomic<u32>>;
+@group(0) @binding(3) var<storage, read_write> all_rays: array<u32>;
+@group(0) @binding(4) var<storage, read_write> keep: array<u32>;
+@group(0) @binding(5) var color_out: texture_storage_2d<rgba8unorm, write>;
+#ifdef OUTPUT_DEPTH
+@group(0) @binding(DEPTH_BINDING) var depth_out: texture_storage_2d<r32float, write>;
+#endif
+#ifdef OUTPUT_NORMAL
+@group(0) @binding(NORMAL_BINDING) var normal_out: texture_storage_2d<rgba16float, write>;
+#endif
+#ifdef OUTPUT_STATUS
+@group(0) @binding(STATUS_BINDING) var status_out: texture_storage_2d<r32uint, write>;
+#endif
+
+var<workgroup> entered_count: atomic<u32>;
+
+// The ray's first state: waiting in the block where it enters the volume, or done.
+fn first_state(ray: DdaRay) -> u32 {
+    let volume = DdaBox(vec3<i32>(0), frame.grid.last_cell);
+    if (any(frame.grid.last_cell < vec3<i32>(0)) || !dda_meets(ray, volume)) {
+        return RAY_DONE;
+    }
+    let cell = dda_cell_after(ray, dda_entry(ray, volume), volume);
+    return RAY_ACTIVE | macrocell_linear(cell >> vec3<u32>(2u), frame.grid.blocks);
+}
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    if (lane == 0u) {
+        atomicStore(&entered_count, 0u);
+    }
+    workgroupBarrier();
+    let id = indirect_linear_group(group, groups) * 64u + lane;
+    let count = frame.width * frame.height;
+    if (id < count) {
+        let pixel = frame_pixel(frame, id);
+        let state = first_state(frame_ray(frame, pixel).ray);
+        let entered = state != RAY_DONE;
+        atomicStore(&rays[RAYS_HEADER + id], state);
+        all_rays[id] = id;
+        keep[id] = u32(entered);
+        outputs_write_empty(pixel, entered);
+        if (entered) {
+            atomicAdd(&entered_count, 1u);
+        }
+    }
+    workgroupBarrier();
+    if (lane == 0u && id < count) {
+        atomicAdd(&rays[RAYS_ENTERED], atomicLoad(&entered_count));
+    }
+    if (id == 0u) {
+        atomicStore(&rays[RAYS_ACTIVE], count);
+    }
+}

@@ -1,0 +1,250 @@
+//! One frame: from camera and volume to the rays' parameters, in f64.
+
+use bytemuck::{Pod, Zeroable};
+use glam::{DMat4, DVec3, DVec4};
+use lru_cache_gpu::LruParams;
+use macrocell::Grid;
+
+use crate::{Camera, Error};
+
+/// Uniform struct `MacrocellGrid` of `macrocell/shader/lib/macrocell_grid.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct GridParams {
+    blocks: [u32; 3],
+    coarse_count: u32,
+    coarse: [u32; 3],
+    has_third_level: u32,
+    third: [u32; 3],
+    pad0: u32,
+    last_cell: [i32; 3],
+    pad1: u32,
+}
+
+impl GridParams {
+    /// The grids of a volume.
+    pub fn new(grid: Grid) -> Self {
+        Self {
+            blocks: grid.blocks(),
+            coarse_count: grid.coarse_count() as u32,
+            coarse: grid.coarse(),
+            has_third_level: grid.has_third_level().into(),
+            third: grid.third(),
+            pad0: 0,
+            last_cell: grid.last_cell(),
+            pad1: 0,
+        }
+    }
+}
+
+/// Uniform struct `FrameParams` of `shader/lib/frame.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct FrameParams {
+    origin: [f32; 3],
+    isovalue: f32,
+    origin_dx: [f32; 3],
+    width: u32,
+    origin_dy: [f32; 3],
+    height: u32,
+    direction: [f32; 3],
+    start_depth: f32,
+    direction_dx: [f32; 3],
+    pad0: u32,
+    direction_dy: [f32; 3],
+    pad1: u32,
+    grid: GridParams,
+    lru: LruParams,
+}
+
+pub(crate) const PARAMS_BYTES: u64 = size_of::<FrameParams>() as u64;
+
+/// The geometry of one frame in f64; rays are affine in the pixel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrameView {
+    size: [u32; 2],
+    /// Index-space start of the central ray and its change per pixel.
+    origin: [DVec3; 3],
+    /// Index-space direction per unit of view depth of the central ray and its change per pixel.
+    direction: [DVec3; 3],
+    /// View depth at which the rays start, in world units.
+    start_depth: f64,
+    clip_from_view: DMat4,
+    /// View-space x and y at view depth d: base + d * slope, each affine in clip-space x and y.
+    base: [DVec3; 3],
+    slope: [DVec3; 3],
+}
+
+impl FrameView {
+    /// A camera's rays through a volume of `dims` voxels in a picture of `size` pixels.
+    ///
+    /// `world_from_index` (column-major) takes the index-space position (i, j, k) of a voxel to
+    /// world space.
+    ///
+    /// # Errors
+    /// If a matrix is not finite or cannot be inverted, or the projection's w depends on x or y.
+    pub fn new(
+        camera: &Camera,
+        size: [u32; 2],
+        world_from_index: [[f64; 4]; 4],
+        dims: [u32; 3],
+    ) -> Result<Self, Error> {
+        let view_from_world = matrix("view_from_world", camera.view_from_world)?;
+        let clip_from_view = matrix("clip_from_view", camera.clip_from_view)?;
+        let world_from_index = matrix("world_from_index", world_from_index)?;
+        let view_from_index = view_from_world * world_from_index;
+        let index_from_view = inverse("view_from_index", view_from_index)?;
+        let [base, slope] = unproject(clip_from_view)?;
+        let start_depth = start_depth(view_from_index, clip_from_view, dims);
+        // Per pixel: clip x grows by 2 / width to the right, clip y falls by 2 / height downwards.
+        let steps = [2.0 / f64::from(size[0]), -2.0 / f64::from(size[1])];
+        let per_pixel = |v: [DVec3; 3]| [v[0], v[1] * steps[0], v[2] * steps[1]];
+        let start = |i: usize| {
+            let z = if i == 0 { DVec3::new(0.0, 0.0, -start_depth) } else { DVec3::ZERO };
+            let view = base[i] + slope[i] * start_depth + z;
+            if i == 0 {
+                index_from_view.transform_point3(view)
+            } else {
+                index_from_view.transform_vector3(view)
+            }
+        };
+        let along = |i: usize| {
+            let z = if i == 0 { DVec3::NEG_Z } else { DVec3::ZERO };
+            index_from_view.transform_vector3(slope[i] + z)
+        };
+        Ok(Self {
+            size,
+            origin: per_pixel([start(0), start(1), start(2)]),
+            direction: per_pixel([along(0), along(1), along(2)]),
+            start_depth,
+            clip_from_view,
+            base,
+            slope,
+        })
+    }
+
+    /// The uniform for the kernels.
+    pub fn params(&self, grid: Grid, lru: LruParams, isovalue: f32) -> FrameParams {
+        let narrow = |v: DVec3| v.as_vec3().to_array();
+        FrameParams {
+            origin: narrow(self.origin[0]),
+            isovalue,
+            origin_dx: narrow(self.origin[1]),
+            width: self.size[0],
+            origin_dy: narrow(self.origin[2]),
+            height: self.size[1],
+            direction: narrow(self.direction[0]),
+            start_depth: self.start_depth as f32,
+            direction_dx: narrow(self.direction[1]),
+            pad0: 0,
+            direction_dy: narrow(self.direction[2]),
+            pad1: 0,
+            grid: GridParams::new(grid),
+            lru,
+        }
+    }
+
+    /// The ray through the centre of pixel (x, y), row 0 on top: start in index space and unit
+    /// direction, in f64, and the view depth gained per voxel.
+    pub fn ray(&self, pixel: [u32; 2]) -> ([f64; 3], [f64; 3], f64) {
+        let x = f64::from(pixel[0]) + 0.5 - f64::from(self.size[0]) / 2.0;
+        let y = f64::from(pixel[1]) + 0.5 - f64::from(self.size[1]) / 2.0;
+        let at = |v: &[DVec3; 3]| v[0] + v[1] * x + v[2] * y;
+        let direction = at(&self.direction);
+        let voxels_per_depth = direction.length();
+        let unit = direction / voxels_per_depth;
+        (at(&self.origin).to_array(), unit.to_array(), 1.0 / voxels_per_depth)
+    }
+
+    /// View depth at which the rays start, in world units.
+    pub fn start_depth(&self) -> f64 {
+        self.start_depth
+    }
+
+    /// Clip-space z and w for a pixel at view depth d: (z0 + d z1, w0 + d w1), each row affine in
+    /// (1, x, y) of clip space.
+    pub(crate) fn clip_rows(&self) -> [[f32; 4]; 4] {
+        let row = |r: usize| {
+            let coefficients = self.clip_from_view.row(r);
+            let constant = |i: usize, v: &[DVec3; 3]| coefficients.truncate().dot(v[i]);
+            let base = [
+                constant(0, &self.base) + coefficients.w,
+                constant(1, &self.base),
+                constant(2, &self.base),
+            ];
+            let slope = [
+                constant(0, &self.slope) - coefficients.z,
+                constant(1, &self.slope),
+                constant(2, &self.slope),
+            ];
+            [base, slope].map(|v| [v[0] as f32, v[1] as f32, v[2] as f32, 0.0])
+        };
+        let [z0, z1] = row(2);
+        let [w0, w1] = row(3);
+        [z0, z1, w0, w1]
+    }
+}
+
+fn matrix(what: &'static str, columns: [[f64; 4]; 4]) -> Result<DMat4, Error> {
+    let m = DMat4::from_cols_array_2d(&columns);
+    if m.is_finite() { Ok(m) } else { Err(Error::NotFinite { what }) }
+}
+
+fn inverse(what: &'static str, m: DMat4) -> Result<DMat4, Error> {
+    let inverse = m.inverse();
+    if m.determinant() != 0.0 && inverse.is_finite() {
+        Ok(inverse)
+    } else {
+        Err(Error::Singular { what })
+    }
+}
+
+/// View-space (x, y) of the points that project to clip-space (X, Y) at view depth d are
+/// base + d * slope; both are returned as coefficients of (1, X, Y).
+fn unproject(clip_from_view: DMat4) -> Result<[[DVec3; 3]; 2], Error> {
+    let [r0, r1, r3] = [0, 1, 3].map(|r| clip_from_view.row(r));
+    if r3.x != 0.0 || r3.y != 0.0 {
+        return Err(Error::UnsupportedProjection { row: r3.to_array() });
+    }
+    let determinant = r0.x * r1.y - r0.y * r1.x;
+    let solve =
+        |a: f64, b: f64| DVec3::new(a * r1.y - b * r0.y, b * r0.x - a * r1.x, 0.0) / determinant;
+    // r0 . p = X w and r1 . p = Y w with p = (x, y, -d, 1) and w = r3.w - r3.z d.
+    let base = [solve(-r0.w, -r1.w), solve(r3.w, 0.0), solve(0.0, r3.w)];
+    let slope = [solve(r0.z, r1.z), solve(-r3.z, 0.0), solve(0.0, -r3.z)];
+    let finite = base.iter().chain(&slope).all(|v| v.is_finite());
+    if finite { Ok([base, slope]) } else { Err(Error::Singular { what: "clip_from_view" }) }
+}
+
+/// The near plane's view depth, or a plane just before the volume where that is farther.
+fn start_depth(view_from_index: DMat4, clip_from_view: DMat4, dims: [u32; 3]) -> f64 {
+    let last = DVec3::from(dims.map(|d| f64::from(d) - 1.0));
+    let depths = (0..8u32).map(|corner| {
+        let pick = |axis: u32| f64::from((corner >> axis) & 1);
+        let index = DVec3::new(pick(0), pick(1), pick(2)) * last;
+        -view_from_index.transform_point3(index).z
+    });
+    let (mut nearest, mut farthest) = (f64::INFINITY, f64::NEG_INFINITY);
+    for depth in depths {
+        nearest = nearest.min(depth);
+        farthest = farthest.max(depth);
+    }
+    // A hundredth of the extent, so that rounding to f32 cannot put a start inside the volume.
+    let before = nearest - 0.01 * (farthest - nearest);
+    before.max(near_depth(clip_from_view))
+}
+
+/// View depth of the nearer of the planes z = 0 and z = w on the view axis; the eye's where a
+/// perspective projection has neither in front.
+fn near_depth(clip_from_view: DMat4) -> f64 {
+    let (z, w): (DVec4, DVec4) = (clip_from_view.row(2), clip_from_view.row(3));
+    // z(d) = z.w - z.z d and w(d) = w.w - w.z d.
+    let zero = z.w / z.z;
+    let full = (z.w - w.w) / (z.z - w.z);
+    let perspective = w.z != 0.0;
+    [zero, full]
+        .into_iter()
+        .filter(|d| d.is_finite() && (!perspective || *d > 0.0))
+        .reduce(f64::min)
+        .unwrap_or(0.0)
+}

@@ -1,0 +1,292 @@
+//! The pictures: textures, shading parameters.
+
+use bytemuck::{Pod, Zeroable};
+use glam::{DMat3, DMat4, DVec3};
+use gpu_primitives::kernel::Binding;
+use gpu_primitives::memory::{Category, Ledger, Texture};
+use gpu_primitives::wgpu;
+use gpu_primitives::wgsl::{Constant, Module};
+
+pub(crate) const OUTPUTS: Module =
+    Module { name: "outputs", source: include_str!("../shader/lib/outputs.wgsl") };
+
+/// Depth of pixels without a hit in the depth texture: the largest f32, since shaders have no
+/// infinity.
+pub const DEPTH_NONE: f32 = f32::MAX;
+
+/// Which pictures are made beside the colour. What is not asked for costs nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Outputs {
+    /// R32Float: distance along the view axis in world units, [`DEPTH_NONE`] without a hit.
+    pub depth: bool,
+    /// Rgba16Float: unit world-space normal towards the viewer, 0 without a hit.
+    pub normal: bool,
+    /// R32Uint: [`PixelStatus`].
+    pub status: bool,
+}
+
+/// What a pixel of the status texture shows.
+#[repr(u32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PixelStatus {
+    /// No surface along the ray: final.
+    Background = 0,
+    /// The surface: final.
+    Hit = 1,
+    /// Not known yet.
+    Unfinished = 2,
+}
+
+/// Formats of the pictures, in binding order.
+const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Float;
+const NORMAL_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
+const STATUS_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
+
+impl Outputs {
+    /// The textures' formats, in the order in which kernels bind them.
+    fn formats(self) -> impl Iterator<Item = (&'static str, wgpu::TextureFormat)> {
+        [
+            (true, "COLOR", COLOR_FORMAT),
+            (self.depth, "DEPTH", DEPTH_FORMAT),
+            (self.normal, "NORMAL", NORMAL_FORMAT),
+            (self.status, "STATUS", STATUS_FORMAT),
+        ]
+        .into_iter()
+        .filter_map(|(wanted, name, format)| wanted.then_some((name, format)))
+    }
+
+    /// Bytes per pixel of all pictures.
+    pub(crate) fn bytes_per_pixel(self) -> u64 {
+        self.formats().map(|(_, f)| u64::from(f.block_copy_size(None).unwrap_or(0))).sum()
+    }
+
+    /// Bindings of the textures, to follow a kernel's buffers.
+    pub(crate) fn bindings(self) -> Vec<Binding> {
+        self.formats().map(|(_, format)| Binding::TextureWrite { format }).collect()
+    }
+
+    /// Constants for `shader/lib/outputs.wgsl` and the importing texts, whose first texture has
+    /// the binding number `first`.
+    pub(crate) fn constants(self, first: u32) -> Vec<(&'static str, Constant)> {
+        let mut next = first;
+        let mut constants = vec![
+            ("OUTPUT_DEPTH", Constant::Bool(self.depth)),
+            ("OUTPUT_NORMAL", Constant::Bool(self.normal)),
+            ("OUTPUT_STATUS", Constant::Bool(self.status)),
+        ];
+        for (name, _) in self.formats() {
+            let binding = match name {
+                "COLOR" => "COLOR_BINDING",
+                "DEPTH" => "DEPTH_BINDING",
+                "NORMAL" => "NORMAL_BINDING",
+                _ => "STATUS_BINDING",
+            };
+            constants.push((binding, Constant::U32(next)));
+            next += 1;
+        }
+        constants
+    }
+}
+
+/// The textures of one picture.
+#[derive(Debug)]
+pub struct OutputTextures {
+    outputs: Outputs,
+    textures: Vec<Texture>,
+    views: Vec<wgpu::TextureView>,
+}
+
+impl OutputTextures {
+    /// Allocates the textures asked for.
+    pub fn new(device: &wgpu::Device, ledger: &Ledger, outputs: Outputs, size: [u32; 2]) -> Self {
+        let textures: Vec<Texture> = outputs
+            .formats()
+            .map(|(name, format)| {
+                let size =
+                    wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 };
+                let desc = wgpu::TextureDescriptor {
+                    label: Some(&format!("wavefront.output.{name}")),
+                    size,
+                    mip_level_count: 1,
+                    sample_count: 1,
+                    dimension: wgpu::TextureDimension::D2,
+                    format,
+                    usage: wgpu::TextureUsages::STORAGE_BINDING
+                        | wgpu::TextureUsages::TEXTURE_BINDING
+                        | wgpu::TextureUsages::COPY_SRC,
+                    view_formats: &[],
+                };
+                ledger.texture(device, Category::Outputs, &desc)
+            })
+            .collect();
+        let views = textures
+            .iter()
+            .map(|t| t.create_view(&wgpu::TextureViewDescriptor::default()))
+            .collect();
+        Self { outputs, textures, views }
+    }
+
+    /// Which pictures there are.
+    pub fn outputs(&self) -> Outputs {
+        self.outputs
+    }
+
+    /// All views in binding order.
+    pub(crate) fn views(&self) -> &[wgpu::TextureView] {
+        &self.views
+    }
+
+    fn position(&self, name: &str) -> Option<usize> {
+        self.outputs.formats().position(|(n, _)| n == name)
+    }
+
+    /// Colour: Rgba8Unorm, display-referred (sRGB-encoded) values, alpha 1 on the surface.
+    pub fn color(&self) -> &wgpu::Texture {
+        &self.textures[0]
+    }
+
+    /// View of [`OutputTextures::color`].
+    pub fn color_view(&self) -> &wgpu::TextureView {
+        &self.views[0]
+    }
+
+    /// Depth, if asked for.
+    pub fn depth(&self) -> Option<&wgpu::Texture> {
+        self.position("DEPTH").map(|i| &*self.textures[i])
+    }
+
+    /// View of [`OutputTextures::depth`].
+    pub fn depth_view(&self) -> Option<&wgpu::TextureView> {
+        self.position("DEPTH").map(|i| &self.views[i])
+    }
+
+    /// Normals, if asked for.
+    pub fn normal(&self) -> Option<&wgpu::Texture> {
+        self.position("NORMAL").map(|i| &*self.textures[i])
+    }
+
+    /// Pixel status, if asked for.
+    pub fn status(&self) -> Option<&wgpu::Texture> {
+        self.position("STATUS").map(|i| &*self.textures[i])
+    }
+}
+
+/// Where the light comes from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Light {
+    /// From the viewer.
+    Headlight,
+    /// From infinitely far along this world-space direction (towards the light; any length but 0).
+    Directional([f32; 3]),
+}
+
+/// Blinn-Phong shading. Colours are display-referred, 0 to 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shading {
+    /// Colour of the surface.
+    pub base_color: [f32; 3],
+    /// Share of the base colour that is always there.
+    pub ambient: f32,
+    /// Share of the base colour in full light.
+    pub diffuse: f32,
+    /// Strength of the white highlight.
+    pub specular: f32,
+    /// Exponent of the highlight.
+    pub shininess: f32,
+    /// The light.
+    pub light: Light,
+    /// Pixels without a surface.
+    pub background: [f32; 4],
+    /// Pixels that are not known yet.
+    pub unfinished: [f32; 4],
+}
+
+impl Default for Shading {
+    fn default() -> Self {
+        Self {
+            base_color: [0.85, 0.76, 0.68],
+            ambient: 0.15,
+            diffuse: 0.75,
+            specular: 0.2,
+            shininess: 30.0,
+            light: Light::Headlight,
+            background: [1.0; 4],
+            unfinished: [1.0; 4],
+        }
+    }
+}
+
+/// Uniform struct `ShadingParams` of `shader/lib/outputs.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct ShadingParams {
+    background: [f32; 4],
+    unfinished: [f32; 4],
+    base_color: [f32; 3],
+    ambient: f32,
+    light: [f32; 3],
+    headlight: u32,
+    diffuse: f32,
+    specular: f32,
+    shininess: f32,
+    pad0: u32,
+    normal_x: [f32; 3],
+    pad1: u32,
+    normal_y: [f32; 3],
+    pad2: u32,
+    normal_z: [f32; 3],
+    pad3: u32,
+    world_x: [f32; 3],
+    pad4: u32,
+    world_y: [f32; 3],
+    pad5: u32,
+    world_z: [f32; 3],
+    pad6: u32,
+}
+
+/// Columns scaled so that the largest entry is 1: shaders normalise, extreme spacings do not overflow.
+fn columns(m: DMat3) -> [[f32; 3]; 3] {
+    let largest = m.to_cols_array().iter().fold(0.0_f64, |a, v| a.max(v.abs()));
+    (m / largest).to_cols_array_2d().map(|c| c.map(|v| v as f32))
+}
+
+impl ShadingParams {
+    /// `world_from_index` as for [`crate::FrameView`], which has checked it.
+    pub fn new(shading: &Shading, world_from_index: [[f64; 4]; 4]) -> Self {
+        let world = DMat3::from_mat4(DMat4::from_cols_array_2d(&world_from_index));
+        let [world_x, world_y, world_z] = columns(world);
+        let [normal_x, normal_y, normal_z] = columns(world.inverse().transpose());
+        let (light, headlight) = match shading.light {
+            Light::Headlight => ([0.0, 0.0, 1.0], 1),
+            Light::Directional(d) => {
+                let unit = DVec3::from(d.map(f64::from)).try_normalize().unwrap_or(DVec3::Z);
+                (unit.as_vec3().to_array(), 0)
+            }
+        };
+        Self {
+            background: shading.background,
+            unfinished: shading.unfinished,
+            base_color: shading.base_color,
+            ambient: shading.ambient,
+            light,
+            headlight,
+            diffuse: shading.diffuse,
+            specular: shading.specular,
+            shininess: shading.shininess,
+            pad0: 0,
+            normal_x,
+            pad1: 0,
+            normal_y,
+            pad2: 0,
+            normal_z,
+            pad3: 0,
+            world_x,
+            pad4: 0,
+            world_y,
+            pad5: 0,
+            world_z,
+            pad6: 0,
+        }
+    }
+}

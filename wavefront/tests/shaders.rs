@@ -1,0 +1,41 @@
+//! Every shader composes, validates and binds what the Rust side says.
+
+use gpu_primitives::kernel::{Binding, KernelSource};
+use gpu_testkit::layout::{self, BindingKind};
+use wavefront::{Outputs, RunAhead};
+
+fn kind(binding: &Binding) -> BindingKind {
+    match *binding {
+        Binding::Uniform { bytes } => BindingKind::Uniform { bytes },
+        Binding::StorageRead { .. } => BindingKind::StorageRead { min_bytes: 0 },
+        Binding::StorageReadWrite { .. } => BindingKind::StorageReadWrite { min_bytes: 0 },
+        Binding::TextureWrite { format } => BindingKind::TextureWrite { format },
+        Binding::TextureSample { sample } => BindingKind::TextureSample { sample },
+    }
+}
+
+fn check(source: &KernelSource) {
+    let text = &source.wgsl.source;
+    if let Ok(folder) = std::env::var("DUMP_WGSL") {
+        std::fs::write(format!("{folder}/{}.wgsl", source.label), text).unwrap();
+    }
+    layout::validate_wgsl(text).unwrap_or_else(|e| panic!("{}: {e}", source.label));
+    let kinds: Vec<BindingKind> = source.bindings.iter().map(kind).collect();
+    layout::check_bindings(text, source.entry_point, &kinds)
+        .unwrap_or_else(|e| panic!("{}: {e}", source.label));
+}
+
+#[test]
+fn kernels_validate_with_every_set_of_outputs_and_pages() {
+    for bits in 0..8 {
+        let outputs = Outputs { depth: bits & 1 != 0, normal: bits & 2 != 0, status: bits & 4 != 0 };
+        for pages in 1..=3 {
+            RunAhead::sources(outputs, pages).iter().for_each(check);
+        }
+    }
+}
+
+#[test]
+fn draw_validates() {
+    layout::validate_wgsl(include_str!("../shader/draw.wgsl")).unwrap();
+}
