@@ -80,7 +80,7 @@ fn source(
         Binding::StorageReadWrite { min_bytes: HEADER_BYTES },
     ];
     bindings.extend_from_slice(rest);
-    let wgsl = compose_fixed(Module { name, source: text }, &[wgsl::STATE, indirect::MODULE], &[]);
+    let wgsl = compose_fixed(Module { name, source: text }, &[wgsl::PARAMS, wgsl::STATE, indirect::MODULE], &[]);
     KernelSource { label, wgsl, entry_point: "main", bindings }
 }
 

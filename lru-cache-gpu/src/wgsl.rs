@@ -2,7 +2,11 @@
 
 use gpu_primitives::wgsl::{Constant, Module};
 
-/// Layout of the cache's state.
+/// Sizes of the cache and the entries of its directory.
+pub const PARAMS: Module =
+    Module { name: "lru_params", source: include_str!("../shader/lib/lru_params.wgsl") };
+
+/// Layout of the cache's state; imports [`PARAMS`].
 pub const STATE: Module =
     Module { name: "lru_state", source: include_str!("../shader/lib/lru_state.wgsl") };
 
@@ -10,7 +14,7 @@ pub const STATE: Module =
 pub const REQUEST: Module =
     Module { name: "lru_request", source: include_str!("../shader/lib/lru_request.wgsl") };
 
-/// Looking up only.
+/// Looking up only; imports [`PARAMS`].
 pub const LOOKUP: Module =
     Module { name: "lru_lookup", source: include_str!("../shader/lib/lru_lookup.wgsl") };
 
@@ -19,7 +23,7 @@ pub const SLOTS: Module =
     Module { name: "lru_slots", source: include_str!("../shader/lib/lru_slots.wgsl") };
 
 /// Everything a walking kernel needs to import from this crate.
-pub const MODULES: [Module; 4] = [STATE, REQUEST, LOOKUP, SLOTS];
+pub const MODULES: [Module; 5] = [PARAMS, STATE, REQUEST, LOOKUP, SLOTS];
 
 /// Constants that fit [`SLOTS`] to a number of slot pages.
 pub fn page_constants(pages: u32) -> [(&'static str, Constant); 2] {

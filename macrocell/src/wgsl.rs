@@ -5,7 +5,11 @@ use gpu_primitives::wgsl::Module;
 /// Exact traversal of nested grids along a ray.
 pub const DDA: Module = Module { name: "dda", source: include_str!("../shader/lib/dda.wgsl") };
 
-/// Advancing to the next active block; imports [`DDA`]. The importing text supplies
+/// Sizes of the nested grids; imports [`DDA`].
+pub const GRID: Module =
+    Module { name: "macrocell_grid", source: include_str!("../shader/lib/macrocell_grid.wgsl") };
+
+/// Advancing to the next active block; imports [`GRID`]. The importing text supplies
 /// `fn macrocell_mask(index: u32) -> vec2<u32>`.
 pub const SKIP: Module =
     Module { name: "macrocell_skip", source: include_str!("../shader/lib/macrocell_skip.wgsl") };
@@ -17,4 +21,4 @@ pub const QUANTISE: Module = Module {
 };
 
 /// Everything a kernel needs to import from this crate.
-pub const MODULES: [Module; 3] = [DDA, SKIP, QUANTISE];
+pub const MODULES: [Module; 4] = [DDA, GRID, SKIP, QUANTISE];

@@ -3,19 +3,7 @@
 //   var<storage, read_write> lru_directory: array<atomic<u32>>;  one entry per block
 //   var<storage, read_write> lru_state: array<atomic<u32>>;
 //   fn lru_params() -> LruParams
-
-struct LruParams {
-    slots: u32,
-    slots_per_page: u32,
-    request_capacity: u32,
-    window_capacity: u32,
-}
-
-// Directory entries: absent, requested, or a slot + LRU_FIRST_SLOT.
-const LRU_ABSENT: u32 = 0u;
-const LRU_REQUESTED: u32 = 1u;
-const LRU_FIRST_SLOT: u32 = 2u;
-const LRU_MISSING: u32 = 0xffffffffu;
+#import lru_params
 
 // Words of the header.
 const LRU_REQUEST_COUNT: u32 = 0u;  // requests of the running round, may exceed the capacity

@@ -1,27 +1,6 @@
 // From any cell to the first cell, at or after it, that lies in an active block.
 // The importing text supplies fn macrocell_mask(index: u32) -> vec2<u32>.
-#import dda
-
-struct MacrocellGrid {
-    blocks: vec3<u32>,
-    coarse_count: u32,
-    coarse: vec3<u32>,
-    has_third_level: u32,
-    third: vec3<u32>,
-    pad0: u32,
-    last_cell: vec3<i32>, // dims - 2
-    pad1: u32,
-}
-
-// Where a walk stands: `cell` was reached by `event`.
-struct MacrocellPlace {
-    event: DdaEvent,
-    cell: vec3<i32>,
-}
-
-fn macrocell_linear(position: vec3<i32>, size: vec3<u32>) -> u32 {
-    return u32(position.x) + size.x * (u32(position.y) + size.y * u32(position.z));
-}
+#import macrocell_grid
 
 fn macrocell_bit(mask: vec2<u32>, position: vec3<i32>) -> bool {
     let bit = u32((position.x & 3) | ((position.y & 3) << 2u) | ((position.z & 3) << 4u));
