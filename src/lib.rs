@@ -1,1 +1,24 @@
-//! Exact isosurfaces of ZFP-compressed volumes, rendered progressively.
+#![doc = include_str!("../README.md")]
+
+mod capture;
+mod error;
+mod load;
+mod options;
+mod plan;
+mod renderer;
+mod report;
+mod timing;
+mod volume;
+
+pub use capture::{Capture, PendingCapture};
+pub use error::Error;
+pub use gpu_primitives::memory::Category;
+pub use options::{Frame, FrameOptions, RendererOptions};
+pub use plan::{Part, ScenePlan};
+pub use renderer::ProgressiveIsoRenderer;
+pub use report::PassReport;
+pub use volume::{CompressedVolume, StreamBytes};
+pub use wavefront::{
+    Camera, DEPTH_NONE, DrawTarget, FrameView, Light, OutputTextures, Outputs, PixelStatus, Shading,
+};
+pub use wgpu;

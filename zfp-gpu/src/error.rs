@@ -1,7 +1,7 @@
 //! What can go wrong before anything is recorded.
 
 /// Why a stream, a plan or a set of buffers cannot be used.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A volume has at least one sample per axis.

@@ -1,0 +1,83 @@
+use thiserror::Error as ThisError;
+
+/// What can go wrong between a volume and its picture.
+#[derive(Debug, Clone, PartialEq, ThisError)]
+#[non_exhaustive]
+pub enum Error {
+    /// The budget does not hold the smallest working set.
+    #[error("the scene needs at least {minimum} bytes of GPU memory, the budget is {budget}")]
+    BudgetTooSmall {
+        /// Least bytes.
+        minimum: u64,
+        /// [`crate::RendererOptions::budget_bytes`].
+        budget: u64,
+    },
+    /// The payload ends too early.
+    #[error(
+        "{dims:?} voxels at {bits_per_block} bits per block need {expected} bytes of stream, found {found}"
+    )]
+    ShortStream {
+        /// Voxels on each axis.
+        dims: [u32; 3],
+        /// Bits of every block.
+        bits_per_block: u32,
+        /// Least bytes.
+        expected: u64,
+        /// Bytes given.
+        found: u64,
+    },
+    /// The device lacks something that every scene needs.
+    #[error("the device offers {found} {what}, at least {needed} are needed")]
+    UnsupportedDevice {
+        /// Which limit.
+        what: &'static str,
+        /// Least value.
+        needed: u64,
+        /// The device's value.
+        found: u64,
+    },
+    /// A frame has exactly one isovalue.
+    #[error("a frame needs exactly one isovalue, found {found}")]
+    IsovalueCount {
+        /// Isovalues given.
+        found: usize,
+    },
+    /// An isovalue is NaN, infinite, or beyond what samples can be.
+    #[error("the isovalue {found} is not finite or larger than 2^124 in size")]
+    Isovalue {
+        /// Isovalue given.
+        found: f32,
+    },
+    /// [`crate::RendererOptions::capture`] was not set.
+    #[error("capture was not planned: set RendererOptions::capture")]
+    CaptureNotPlanned,
+    /// Nothing to draw to.
+    #[error("drawing was not planned: set RendererOptions::draw_target")]
+    DrawNotPlanned,
+    /// No frame has been set.
+    #[error("no frame has been set")]
+    NoFrame,
+    /// Several passes in a row changed nothing: a fault of the device or of this library.
+    #[error("no progress in {passes} passes with {active_rays} rays unfinished")]
+    Stalled {
+        /// Passes without progress.
+        passes: u32,
+        /// Rays that are not finished.
+        active_rays: u32,
+    },
+    /// The device was lost or failed while the caller waited.
+    #[error("waiting for the device failed: {0}")]
+    Device(String),
+    /// The compressed stream.
+    #[error(transparent)]
+    Stream(#[from] zfp_gpu::Error),
+    /// Value ranges and masks.
+    #[error(transparent)]
+    Macrocell(#[from] macrocell::Error),
+    /// The block cache.
+    #[error(transparent)]
+    Cache(#[from] lru_cache_gpu::Error),
+    /// Rays, camera and pictures.
+    #[error(transparent)]
+    Wavefront(#[from] wavefront::Error),
+}

@@ -1,0 +1,66 @@
+//! What a caller chooses.
+
+use wavefront::{Camera, DrawTarget, Outputs, Shading};
+
+/// Choices that hold for the life of a renderer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RendererOptions {
+    /// Width and height of the picture in pixels; see [`crate::ProgressiveIsoRenderer::resize`].
+    pub size: [u32; 2],
+    /// Most bytes of GPU memory: every buffer and texture that the library makes.
+    pub budget_bytes: u64,
+    /// Pictures beside the colour.
+    pub outputs: Outputs,
+    /// The caller's targets for [`crate::ProgressiveIsoRenderer::draw`]; adds the depth output.
+    pub draw_target: Option<DrawTarget>,
+    /// Whether pictures will be read back with [`crate::ProgressiveIsoRenderer::capture`].
+    pub capture: bool,
+}
+
+impl Default for RendererOptions {
+    /// 1280x720 pixels in 256 MiB, colour only.
+    fn default() -> Self {
+        Self {
+            size: [1280, 720],
+            budget_bytes: 256 << 20,
+            outputs: Outputs::default(),
+            draw_target: None,
+            capture: false,
+        }
+    }
+}
+
+impl RendererOptions {
+    /// The outputs, with those that other choices need.
+    pub(crate) fn all_outputs(&self) -> Outputs {
+        let depth = self.outputs.depth || self.draw_target.is_some();
+        Outputs { depth, ..self.outputs }
+    }
+}
+
+/// What one picture shows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frame {
+    /// The camera.
+    pub camera: Camera,
+    /// Values of the surfaces; exactly one for now.
+    pub isovalues: Vec<f32>,
+    /// Choices for this frame.
+    pub options: FrameOptions,
+}
+
+/// Choices that may change with every frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrameOptions {
+    /// Colours and light.
+    pub shading: Shading,
+    /// Rounds of walk, request and decode per pass, at least 1. More rounds per pass mean fewer
+    /// submissions and longer ones.
+    pub rounds_per_pass: u32,
+}
+
+impl Default for FrameOptions {
+    fn default() -> Self {
+        Self { shading: Shading::default(), rounds_per_pass: 1 }
+    }
+}

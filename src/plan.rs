@@ -1,0 +1,249 @@
+//! The plan: what a scene needs, part by part, before anything is allocated.
+
+use std::fmt::Write as _;
+
+use gpu_primitives::memory::Ledger;
+use gpu_primitives::readback::ReadbackRing;
+use lru_cache_gpu::CachePlan;
+use macrocell::{MacrocellPlan, Masks, RangeScratch};
+use wavefront::{DrawBuffers, WavefrontPlan};
+use zfp_gpu::{DecodeBuffers, ExtremaBuffers, PayloadPlan};
+
+use crate::load::LoadPlan;
+use crate::renderer::READBACK_BYTES;
+use crate::{CompressedVolume, Error, RendererOptions, capture, wgpu};
+
+/// Passes that may be in flight.
+pub(crate) const PASSES_IN_FLIGHT: usize = 2;
+
+/// Largest upload chunk of a frame's parameters.
+pub(crate) const PARAMS_CHUNK: u64 = 1024;
+
+/// Staging memory of parameters: chunks of at most [`PARAMS_CHUNK`] bytes, two passes in flight.
+const PARAMS_STAGING: u64 = 128 << 10;
+
+/// One part of a scene.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Part {
+    /// What it is.
+    pub name: &'static str,
+    /// Bytes of GPU memory; 0 for a part that is left out.
+    pub bytes: u64,
+    /// Why it is in or left out.
+    pub why: String,
+    /// Whether the scene has it. What it does not have costs no byte, pipeline or dispatch.
+    pub included: bool,
+}
+
+/// What a scene needs, computed from the volume, the options and the device's limits alone.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScenePlan {
+    pub(crate) payload: PayloadPlan,
+    pub(crate) macrocell: MacrocellPlan,
+    pub(crate) load: LoadPlan,
+    pub(crate) cache: CachePlan,
+    pub(crate) wavefront: WavefrontPlan,
+    parts: Vec<Part>,
+    budget_bytes: u64,
+}
+
+impl ScenePlan {
+    /// Plans a scene.
+    ///
+    /// # Errors
+    /// If the volume or picture exceeds the device's limits, or the budget is below the minimum,
+    /// which the error names.
+    pub fn new(
+        volume: &CompressedVolume,
+        options: &RendererOptions,
+        limits: &wgpu::Limits,
+    ) -> Result<Self, Error> {
+        check_limits(limits)?;
+        let payload = PayloadPlan::new(volume.layout(), limits)?;
+        let macrocell = MacrocellPlan::new(volume.dims(), limits)?;
+        let outputs = options.all_outputs();
+        let wavefront = WavefrontPlan::new(options.size, outputs, limits)?;
+        let load = LoadPlan::new(payload.layout().stream_bytes(), options.budget_bytes);
+        let mut parts = fixed_parts(options, &payload, &macrocell, &load, &wavefront);
+        let fixed: u64 = parts.iter().map(|part| part.bytes).sum();
+        let blocks = macrocell.grid().block_count();
+        let minimum = fixed + CachePlan::minimum_bytes(blocks);
+        let budget = options.budget_bytes;
+        if minimum > budget {
+            return Err(Error::BudgetTooSmall { minimum, budget });
+        }
+        let cache = CachePlan::fit(blocks, budget - fixed, limits)?;
+        parts.push(cache_part(&cache, blocks));
+        Ok(Self { payload, macrocell, load, cache, wavefront, parts, budget_bytes: budget })
+    }
+
+    /// The same scene with one pixel and the smallest cache, for the time of a change of size.
+    pub(crate) fn shrunk(&self, limits: &wgpu::Limits) -> Result<Self, Error> {
+        let blocks = self.blocks();
+        let cache = CachePlan::fit(blocks, CachePlan::minimum_bytes(blocks), limits)?;
+        let wavefront = WavefrontPlan::new([1, 1], self.wavefront.outputs(), limits)?;
+        Ok(Self { cache, wavefront, ..self.clone() })
+    }
+
+    /// The parts, in or left out.
+    #[must_use]
+    pub fn parts(&self) -> &[Part] {
+        &self.parts
+    }
+
+    /// Most bytes that the scene ever takes.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.parts.iter().map(|part| part.bytes).sum()
+    }
+
+    /// The budget that was given.
+    #[must_use]
+    pub fn budget_bytes(&self) -> u64 {
+        self.budget_bytes
+    }
+
+    /// Slots of the block cache.
+    #[must_use]
+    pub fn slots(&self) -> u64 {
+        self.cache.slots()
+    }
+
+    /// Blocks of the volume.
+    #[must_use]
+    pub fn blocks(&self) -> u64 {
+        self.macrocell.grid().block_count()
+    }
+
+    /// A table of the parts for people.
+    #[must_use]
+    pub fn explain(&self) -> String {
+        let mut text = String::new();
+        let dims = self.macrocell.grid().dims();
+        let [width, height] = self.wavefront.size();
+        // Writing to a String cannot fail.
+        let mut line = |name: &str, bytes: &str, why: &str| {
+            let _ = writeln!(text, "{name:<16} {bytes:>12}  {why}");
+        };
+        line("part", "bytes", &format!("{dims:?} voxels, {width}x{height} pixels"));
+        for part in &self.parts {
+            let bytes = if part.included { part.bytes.to_string() } else { "left out".into() };
+            line(part.name, &bytes, &part.why);
+        }
+        line("total", &self.bytes().to_string(), &format!("of a budget of {}", self.budget_bytes));
+        text
+    }
+}
+
+/// Limits that every scene needs: WebGPU's defaults.
+fn check_limits(limits: &wgpu::Limits) -> Result<(), Error> {
+    let needed = wgpu::Limits::default();
+    let checks = [
+        (
+            "storage buffers per shader stage",
+            needed.max_storage_buffers_per_shader_stage,
+            limits.max_storage_buffers_per_shader_stage,
+        ),
+        (
+            "storage textures per shader stage",
+            needed.max_storage_textures_per_shader_stage,
+            limits.max_storage_textures_per_shader_stage,
+        ),
+        (
+            "invocations per workgroup",
+            needed.max_compute_invocations_per_workgroup,
+            limits.max_compute_invocations_per_workgroup,
+        ),
+        (
+            "workgroups per dimension",
+            needed.max_compute_workgroups_per_dimension,
+            limits.max_compute_workgroups_per_dimension,
+        ),
+        (
+            "bytes of workgroup memory",
+            needed.max_compute_workgroup_storage_size,
+            limits.max_compute_workgroup_storage_size,
+        ),
+    ];
+    for (what, needed, found) in checks {
+        if found < needed {
+            let (needed, found) = (u64::from(needed), u64::from(found));
+            return Err(Error::UnsupportedDevice { what, needed, found });
+        }
+    }
+    Ok(())
+}
+
+fn part(name: &'static str, bytes: u64, why: impl Into<String>) -> Part {
+    Part { name, bytes, why: why.into(), included: true }
+}
+
+fn left_out(name: &'static str, why: &'static str) -> Part {
+    Part { name, bytes: 0, why: why.into(), included: false }
+}
+
+fn fixed_parts(
+    options: &RendererOptions,
+    payload: &PayloadPlan,
+    macrocell: &MacrocellPlan,
+    load: &LoadPlan,
+    wavefront: &WavefrontPlan,
+) -> Vec<Part> {
+    let grid = macrocell.grid();
+    let readback = ReadbackRing::new(&Ledger::new(), "plan", READBACK_BYTES, PASSES_IN_FLIGHT);
+    let scratch = macrocell.scratch_bytes() + RangeScratch::PARAMS_BYTES + ExtremaBuffers::BYTES;
+    let mut parts = vec![
+        part(
+            "payload",
+            payload.bytes(),
+            format!("compressed stream, {} page(s)", payload.page_count()),
+        ),
+        part("ranges", macrocell.range_bytes(), "value ranges, 2 bytes a block"),
+        part(
+            "masks",
+            macrocell.mask_bytes() + Masks::params_bytes(macrocell),
+            "active blocks of one isovalue",
+        ),
+        part("range scratch", scratch, "while loading"),
+        part("upload", load.staging_bytes() + PARAMS_STAGING, "staging"),
+        part(
+            "readback",
+            readback.bytes_limit() + crate::renderer::CONTROL_BYTES,
+            "counters of two passes",
+        ),
+        part("rays", wavefront.ray_bytes(), "states and active lists"),
+        part("pictures", wavefront.output_bytes(), picture_names(wavefront)),
+        part("decode", DecodeBuffers::BYTES, "parameters"),
+    ];
+    parts.push(if grid.has_third_level() {
+        part("third level", 0, "counted with the masks")
+    } else {
+        left_out("third level", "fewer than 512 coarse cells")
+    });
+    parts.push(match options.draw_target {
+        Some(_) => part("draw", DrawBuffers::BYTES, "into the caller's targets"),
+        None => left_out("draw", "no draw target"),
+    });
+    parts.push(if options.capture {
+        part("capture", capture::bytes(wavefront), "pictures read back")
+    } else {
+        left_out("capture", "not asked for")
+    });
+    parts
+}
+
+fn picture_names(wavefront: &WavefrontPlan) -> String {
+    let outputs = wavefront.outputs();
+    let mut names = vec!["colour"];
+    names.extend(outputs.depth.then_some("depth"));
+    names.extend(outputs.normal.then_some("normal"));
+    names.extend(outputs.status.then_some("status"));
+    names.join(", ")
+}
+
+fn cache_part(cache: &CachePlan, blocks: u64) -> Part {
+    let share = 100.0 * cache.slots() as f64 / blocks as f64;
+    let why = format!("{} slots for {blocks} blocks ({share:.1} %)", cache.slots());
+    part("cache", cache.bytes(), why)
+}

@@ -1,0 +1,74 @@
+//! What a renderer tells about its passes.
+
+/// The state of a frame after its newest pass that the GPU has finished.
+///
+/// Passes are reported one or more calls late, because nothing waits for the GPU; `frame` and
+/// `pass` name the pass that the numbers describe.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct PassReport {
+    /// Whether this call submitted a pass; false while two are in flight.
+    pub submitted: bool,
+    /// Share of the volume that is loaded, 0 to 1; rays start at 1.
+    pub loaded: f32,
+    /// The frame described, counted from 1 by `set_frame`; 0 when none has been seen yet.
+    pub frame: u64,
+    /// The newest frame set.
+    pub newest_frame: u64,
+    /// The pass described, counted from 1 within its frame; 0 when none has finished yet.
+    pub pass: u32,
+    /// Rounds of the frame up to and including that pass.
+    pub rounds: u32,
+    /// Pixels, hence rays.
+    pub rays: u32,
+    /// Rays that enter the volume.
+    pub entered_rays: u32,
+    /// Rays that are not finished.
+    pub active_rays: u32,
+    /// Pixels that show the surface.
+    pub hits: u32,
+    /// Blocks requested in this frame, once per round each.
+    pub blocks_requested: u32,
+    /// Blocks decoded in this frame, repeats included.
+    pub blocks_decoded: u32,
+    /// Blocks evicted in this frame.
+    pub blocks_evicted: u32,
+    /// CPU time of recording the described pass, in milliseconds.
+    pub cpu_ms: f64,
+    /// GPU time of the described pass in milliseconds, where the device has timestamp queries.
+    pub gpu_ms: Option<f64>,
+    /// Bytes of GPU memory allocated now.
+    pub bytes: u64,
+    /// Most bytes allocated at any time.
+    pub peak_bytes: u64,
+}
+
+impl PassReport {
+    /// Finished share of the rays that enter the volume, 0 to 1; 1 when none enters.
+    #[must_use]
+    pub fn completeness(&self) -> f64 {
+        self.share(self.entered_rays)
+    }
+
+    /// Finished share of all pixels, those that miss the volume included.
+    #[must_use]
+    pub fn completeness_pixels(&self) -> f64 {
+        self.share(self.rays)
+    }
+
+    fn share(&self, of: u32) -> f64 {
+        if self.pass == 0 || self.frame != self.newest_frame {
+            0.0
+        } else if of == 0 {
+            1.0
+        } else {
+            1.0 - f64::from(self.active_rays) / f64::from(of)
+        }
+    }
+
+    /// Whether the newest frame is finished: every pixel is final.
+    #[must_use]
+    pub fn complete(&self) -> bool {
+        self.pass > 0 && self.frame == self.newest_frame && self.active_rays == 0
+    }
+}
