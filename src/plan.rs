@@ -1,7 +1,5 @@
 //! The plan: what a scene needs, part by part, before anything is allocated.
 
-use std::fmt::Write as _;
-
 use gpu_primitives::memory::Ledger;
 use gpu_primitives::readback::ReadbackRing;
 use lru_cache_gpu::CachePlan;
@@ -119,19 +117,16 @@ impl ScenePlan {
     /// A table of the parts for people.
     #[must_use]
     pub fn explain(&self) -> String {
-        let mut text = String::new();
         let dims = self.macrocell.grid().dims();
         let [width, height] = self.wavefront.size();
-        // Writing to a String cannot fail.
-        let mut line = |name: &str, bytes: &str, why: &str| {
-            let _ = writeln!(text, "{name:<16} {bytes:>12}  {why}");
-        };
-        line("part", "bytes", &format!("{dims:?} voxels, {width}x{height} pixels"));
+        let line = |name: &str, bytes: &str, why: &str| format!("{name:<16} {bytes:>12}  {why}\n");
+        let mut text = line("part", "bytes", &format!("{dims:?} voxels, {width}x{height} pixels"));
         for part in &self.parts {
             let bytes = if part.included { part.bytes.to_string() } else { "left out".into() };
-            line(part.name, &bytes, &part.why);
+            text += &line(part.name, &bytes, &part.why);
         }
-        line("total", &self.bytes().to_string(), &format!("of a budget of {}", self.budget_bytes));
+        let budget = format!("of a budget of {}", self.budget_bytes);
+        text += &line("total", &self.bytes().to_string(), &budget);
         text
     }
 }

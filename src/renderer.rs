@@ -188,7 +188,7 @@ impl ProgressiveIsoRenderer {
         let [isovalue] = frame.isovalues[..] else {
             return Err(Error::IsovalueCount { found: frame.isovalues.len() });
         };
-        if !(isovalue.abs() <= LARGEST_VALUE) {
+        if !isovalue.is_finite() || isovalue.abs() > LARGEST_VALUE {
             return Err(Error::Isovalue { found: isovalue });
         }
         let view = self.view(frame)?;
@@ -542,7 +542,7 @@ impl ProgressiveIsoRenderer {
         Ok(())
     }
 
-    /// Colour as known so far: Rgba8Unorm with display-referred values.
+    /// Colour as known so far: `Rgba8Unorm` with display-referred values.
     pub fn color_view(&self) -> &wgpu::TextureView {
         self.picture.textures.color_view()
     }

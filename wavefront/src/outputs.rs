@@ -17,11 +17,11 @@ pub const DEPTH_NONE: f32 = f32::MAX;
 /// Which pictures are made beside the colour. What is not asked for costs nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Outputs {
-    /// R32Float: distance along the view axis in world units, [`DEPTH_NONE`] without a hit.
+    /// `R32Float`: distance along the view axis in world units, [`DEPTH_NONE`] without a hit.
     pub depth: bool,
-    /// Rgba16Float: unit world-space normal towards the viewer, 0 without a hit.
+    /// `Rgba16Float`: unit world-space normal towards the viewer, 0 without a hit.
     pub normal: bool,
-    /// R32Uint: [`PixelStatus`].
+    /// `R32Uint`: [`PixelStatus`].
     pub status: bool,
 }
 
@@ -37,53 +37,64 @@ pub enum PixelStatus {
     Unfinished = 2,
 }
 
-/// Formats of the pictures, in binding order.
-const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
-const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Float;
-const NORMAL_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
-const STATUS_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
+/// One kind of picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct PictureFormat {
+    label: &'static str,
+    /// Constant in the shaders that holds its binding number.
+    binding: &'static str,
+    format: wgpu::TextureFormat,
+}
+
+const COLOR: PictureFormat = PictureFormat {
+    label: "wavefront.output.color",
+    binding: "COLOR_BINDING",
+    format: wgpu::TextureFormat::Rgba8Unorm,
+};
+const DEPTH: PictureFormat = PictureFormat {
+    label: "wavefront.output.depth",
+    binding: "DEPTH_BINDING",
+    format: wgpu::TextureFormat::R32Float,
+};
+const NORMAL: PictureFormat = PictureFormat {
+    label: "wavefront.output.normal",
+    binding: "NORMAL_BINDING",
+    format: wgpu::TextureFormat::Rgba16Float,
+};
+const STATUS: PictureFormat = PictureFormat {
+    label: "wavefront.output.status",
+    binding: "STATUS_BINDING",
+    format: wgpu::TextureFormat::R32Uint,
+};
 
 impl Outputs {
-    /// The textures' formats, in the order in which kernels bind them.
-    fn formats(self) -> impl Iterator<Item = (&'static str, wgpu::TextureFormat)> {
-        [
-            (true, "COLOR", COLOR_FORMAT),
-            (self.depth, "DEPTH", DEPTH_FORMAT),
-            (self.normal, "NORMAL", NORMAL_FORMAT),
-            (self.status, "STATUS", STATUS_FORMAT),
-        ]
-        .into_iter()
-        .filter_map(|(wanted, name, format)| wanted.then_some((name, format)))
+    /// The textures, in the order in which kernels bind them.
+    fn formats(self) -> impl Iterator<Item = PictureFormat> {
+        let all =
+            [(true, COLOR), (self.depth, DEPTH), (self.normal, NORMAL), (self.status, STATUS)];
+        all.into_iter().filter_map(|(wanted, picture)| wanted.then_some(picture))
     }
 
     /// Bytes per pixel of all pictures.
     pub(crate) fn bytes_per_pixel(self) -> u64 {
-        self.formats().map(|(_, f)| u64::from(f.block_copy_size(None).unwrap_or(0))).sum()
+        self.formats().map(|p| u64::from(p.format.block_copy_size(None).unwrap_or(0))).sum()
     }
 
     /// Bindings of the textures, to follow a kernel's buffers.
     pub(crate) fn bindings(self) -> Vec<Binding> {
-        self.formats().map(|(_, format)| Binding::TextureWrite { format }).collect()
+        self.formats().map(|p| Binding::TextureWrite { format: p.format }).collect()
     }
 
     /// Constants for `shader/lib/outputs.wgsl` and the importing texts, whose first texture has
     /// the binding number `first`.
     pub(crate) fn constants(self, first: u32) -> Vec<(&'static str, Constant)> {
-        let mut next = first;
         let mut constants = vec![
             ("OUTPUT_DEPTH", Constant::Bool(self.depth)),
             ("OUTPUT_NORMAL", Constant::Bool(self.normal)),
             ("OUTPUT_STATUS", Constant::Bool(self.status)),
         ];
-        for (name, _) in self.formats() {
-            let binding = match name {
-                "COLOR" => "COLOR_BINDING",
-                "DEPTH" => "DEPTH_BINDING",
-                "NORMAL" => "NORMAL_BINDING",
-                _ => "STATUS_BINDING",
-            };
-            constants.push((binding, Constant::U32(next)));
-            next += 1;
+        for (number, picture) in (first..).zip(self.formats()) {
+            constants.push((picture.binding, Constant::U32(number)));
         }
         constants
     }
@@ -102,16 +113,16 @@ impl OutputTextures {
     pub fn new(device: &wgpu::Device, ledger: &Ledger, outputs: Outputs, size: [u32; 2]) -> Self {
         let textures: Vec<Texture> = outputs
             .formats()
-            .map(|(name, format)| {
+            .map(|picture| {
                 let size =
                     wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 };
                 let desc = wgpu::TextureDescriptor {
-                    label: Some(&format!("wavefront.output.{name}")),
+                    label: Some(picture.label),
                     size,
                     mip_level_count: 1,
                     sample_count: 1,
                     dimension: wgpu::TextureDimension::D2,
-                    format,
+                    format: picture.format,
                     usage: wgpu::TextureUsages::STORAGE_BINDING
                         | wgpu::TextureUsages::TEXTURE_BINDING
                         | wgpu::TextureUsages::COPY_SRC,
@@ -137,11 +148,11 @@ impl OutputTextures {
         &self.views
     }
 
-    fn position(&self, name: &str) -> Option<usize> {
-        self.outputs.formats().position(|(n, _)| n == name)
+    fn position(&self, wanted: PictureFormat) -> Option<usize> {
+        self.outputs.formats().position(|picture| picture == wanted)
     }
 
-    /// Colour: Rgba8Unorm, display-referred (sRGB-encoded) values, alpha 1 on the surface.
+    /// Colour: `Rgba8Unorm`, display-referred (sRGB-encoded) values, alpha 1 on the surface.
     pub fn color(&self) -> &wgpu::Texture {
         &self.textures[0]
     }
@@ -153,22 +164,22 @@ impl OutputTextures {
 
     /// Depth, if asked for.
     pub fn depth(&self) -> Option<&wgpu::Texture> {
-        self.position("DEPTH").map(|i| &*self.textures[i])
+        self.position(DEPTH).map(|i| &*self.textures[i])
     }
 
     /// View of [`OutputTextures::depth`].
     pub fn depth_view(&self) -> Option<&wgpu::TextureView> {
-        self.position("DEPTH").map(|i| &self.views[i])
+        self.position(DEPTH).map(|i| &self.views[i])
     }
 
     /// Normals, if asked for.
     pub fn normal(&self) -> Option<&wgpu::Texture> {
-        self.position("NORMAL").map(|i| &*self.textures[i])
+        self.position(NORMAL).map(|i| &*self.textures[i])
     }
 
     /// Pixel status, if asked for.
     pub fn status(&self) -> Option<&wgpu::Texture> {
-        self.position("STATUS").map(|i| &*self.textures[i])
+        self.position(STATUS).map(|i| &*self.textures[i])
     }
 }
 
