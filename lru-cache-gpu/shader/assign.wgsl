@@ -27,12 +27,15 @@ fn main(
     if (atomicLoad(&lru_directory[block]) != LRU_REQUESTED) {
         return; // the leader has it already
     }
-    if (index >= victim_count[0]) {
-        atomicStore(&lru_directory[block], LRU_ABSENT);
-        atomicAdd(&lru_state[LRU_DEFERRED_TOTAL], 1u);
-        return;
+    var slot = block;
+    if (!lru_holds_all()) {
+        if (index >= victim_count[0]) {
+            atomicStore(&lru_directory[block], LRU_ABSENT);
+            atomicAdd(&lru_state[LRU_DEFERRED_TOTAL], 1u);
+            return;
+        }
+        slot = victims[index];
     }
-    let slot = victims[index];
     lru_place(block, slot, atomicLoad(&lru_state[LRU_CLOCK]));
     jobs[atomicAdd(&lru_state[LRU_JOB_COUNT], 1u)] = vec2<u32>(block, slot);
 }

@@ -9,7 +9,7 @@
 @group(0) @binding(3) var<storage, read_write> jobs: array<vec2<u32>>;
 @group(0) @binding(4) var<storage, read_write> control: array<u32>;
 
-// Slots that the leader's search looks at before it takes one that is in use.
+// Slots that the leader's search looks at for one that nobody needs.
 const POLITE_STEPS: u32 = 64u;
 
 fn lru_params() -> LruParams {
@@ -20,24 +20,39 @@ fn leader_entry(index: u32) -> u32 {
     return atomicLoad(&lru_directory[atomicLoad(&lru_state[LRU_LEADER + index])]);
 }
 
-// A slot that the leader does not need; one not used in this round if a short search finds it.
-// There is one because the leader needs no more blocks than there are slots.
+// How reluctantly the leader takes a slot, 3: never.
+fn reluctance(slot: u32, spared_from: u32, clock: u32) -> u32 {
+    let stamp = atomicLoad(&lru_state[lru_stamp_word(slot)]);
+    if (stamp < spared_from) {
+        return 0u;
+    }
+    if (stamp < clock) {
+        return 1u;
+    }
+    return select(2u, 3u, stamp == LRU_PINNED);
+}
+
+// A slot that the leader does not need: the best among the next ones after the hand. There is one
+// because the leader needs no more blocks than there are slots.
 fn leader_victim() -> u32 {
     let clock = atomicLoad(&lru_state[LRU_CLOCK]);
-    var slot = atomicLoad(&lru_state[LRU_LEADER_HAND]) % params.slots;
-    var fallback = slot;
-    for (var step = 0u; step < params.slots; step++) {
-        let stamp = atomicLoad(&lru_state[lru_stamp_word(slot)]);
-        if (stamp != LRU_PINNED) {
-            fallback = slot;
-            if (stamp < clock || step >= POLITE_STEPS) {
-                break;
-            }
+    let spared_from = lru_spared_from();
+    var slot = atomicLoad(&lru_state[LRU_HAND]) % params.slots;
+    var best = slot;
+    var best_reluctance = 3u;
+    for (var step = 1u; step <= params.slots; step++) {
+        let found = reluctance(slot, spared_from, clock);
+        if (found < best_reluctance) {
+            best = slot;
+            best_reluctance = found;
+        }
+        if (best_reluctance == 0u || (step >= POLITE_STEPS && best_reluctance < 3u)) {
+            break;
         }
         slot = (slot + 1u) % params.slots;
     }
-    atomicStore(&lru_state[LRU_LEADER_HAND], (fallback + 1u) % params.slots);
-    return fallback;
+    atomicStore(&lru_state[LRU_HAND], (best + 1u) % params.slots);
+    return best;
 }
 
 fn serve_leader() -> u32 {
@@ -52,7 +67,10 @@ fn serve_leader() -> u32 {
     for (var i = 0u; i < count; i++) {
         if (leader_entry(i) < LRU_FIRST_SLOT) {
             let block = atomicLoad(&lru_state[LRU_LEADER + i]);
-            let slot = leader_victim();
+            var slot = block;
+            if (!lru_holds_all()) {
+                slot = leader_victim();
+            }
             lru_place(block, slot, LRU_PINNED);
             jobs[served] = vec2<u32>(block, slot);
             served++;
@@ -70,7 +88,8 @@ fn main() {
     let served = serve_leader();
     atomicStore(&lru_state[LRU_JOB_COUNT], served);
     let requests = lru_requests();
-    let window = select(min(2u * requests + 256u, params.window_capacity), 0u, requests == 0u);
+    let search_nothing = requests == 0u || lru_holds_all();
+    let window = select(min(2u * requests + 256u, params.window_capacity), 0u, search_nothing);
     let search = indirect_fold((window + 63u) / 64u);
     let assign = indirect_fold((requests + 63u) / 64u);
     control[0] = search.x;

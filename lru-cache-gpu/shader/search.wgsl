@@ -26,8 +26,7 @@ fn main(
     }
     // The hand is below 2^31 and the window no longer than the number of slots.
     let slot = (atomicLoad(&lru_state[LRU_HAND]) + index) % params.slots;
-    let spare_frame = atomicLoad(&lru_state[LRU_SPARE_FRAME]) != 0u;
-    let spared_from = atomicLoad(&lru_state[select(LRU_CLOCK, LRU_FRAME_CLOCK, spare_frame)]);
-    is_victim[index] = select(0u, 1u, atomicLoad(&lru_state[lru_stamp_word(slot)]) < spared_from);
+    let stamp = atomicLoad(&lru_state[lru_stamp_word(slot)]);
+    is_victim[index] = select(0u, 1u, stamp < lru_spared_from());
     searched[index] = slot;
 }

@@ -67,9 +67,8 @@ impl CachePlan {
         if directory > binding {
             return Err(Error::DirectoryTooLarge { blocks, needed: directory, available: binding });
         }
-        // The state (two words a slot, and the requests) is bound as a whole, too.
-        let state_slots = (binding / 4 - HEADER_WORDS - MAX_REQUESTS) / 2;
-        let slots_per_page = binding / SLOT_BYTES;
+        let state_slots = Self::slots_of_a_state(binding);
+        let slots_per_page = (binding / SLOT_BYTES).max(1);
         let most = blocks.min(slots_per_page * MAX_PAGES).min(state_slots);
         let with = |slots| Self { blocks, slots, slots_per_page };
         let least = Self::least_slots(blocks);
@@ -78,7 +77,7 @@ impl CachePlan {
             return Err(Error::TooFewBytes { blocks, minimum, available: bytes });
         }
         // bytes() does not decrease with slots: the largest fitting count, by bisection.
-        let (mut fits, mut beyond) = (least, most + 1);
+        let (mut fits, mut beyond) = (least, most.max(least) + 1);
         while beyond - fits > 1 {
             let middle = fits + (beyond - fits) / 2;
             if with(middle).bytes() <= bytes {
@@ -88,6 +87,13 @@ impl CachePlan {
             }
         }
         Ok(with(fits))
+    }
+
+    /// Most slots whose state (two words each, and the requests) fits one binding.
+    fn slots_of_a_state(binding: u64) -> u64 {
+        let words = (binding / 4).saturating_sub(HEADER_WORDS);
+        // Each slot adds a request, too, until the list is as long as it gets.
+        if words <= 3 * MAX_REQUESTS { words / 3 } else { (words - MAX_REQUESTS) / 2 }
     }
 
     fn least_slots(blocks: u64) -> u64 {

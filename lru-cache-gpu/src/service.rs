@@ -15,7 +15,7 @@ const HEADER_BYTES: u64 = 4 * HEADER_WORDS;
 pub(crate) const JOB_COUNT_WORD: u64 = 6;
 
 /// First of the counters' words in the header.
-const COUNTER_WORD: u64 = 9;
+const COUNTER_WORD: u64 = 8;
 
 /// Uniform of `shader/finish.wgsl`.
 #[repr(C)]
@@ -23,12 +23,14 @@ const COUNTER_WORD: u64 = 9;
 pub(crate) struct FinishParams {
     lru: LruParams,
     jobs_per_group: u32,
-    pad: [u32; 3],
+    pad0: u32,
+    pad1: u32,
+    pad2: u32,
 }
 
 impl FinishParams {
     pub(crate) fn new(lru: LruParams, jobs_per_group: u32) -> Self {
-        Self { lru, jobs_per_group: jobs_per_group.max(1), pad: [0; 3] }
+        Self { lru, jobs_per_group: jobs_per_group.max(1), pad0: 0, pad1: 0, pad2: 0 }
     }
 }
 
@@ -42,7 +44,7 @@ pub struct Counters {
     pub decoded: u32,
     /// Blocks that lost their slot.
     pub evicted: u32,
-    /// Requests without a slot.
+    /// Requests that found no slot.
     pub deferred: u32,
 }
 
@@ -80,7 +82,11 @@ fn source(
         Binding::StorageReadWrite { min_bytes: HEADER_BYTES },
     ];
     bindings.extend_from_slice(rest);
-    let wgsl = compose_fixed(Module { name, source: text }, &[wgsl::PARAMS, wgsl::STATE, indirect::MODULE], &[]);
+    let wgsl = compose_fixed(
+        Module { name, source: text },
+        &[wgsl::PARAMS, wgsl::STATE, indirect::MODULE],
+        &[],
+    );
     KernelSource { label, wgsl, entry_point: "main", bindings }
 }
 
@@ -164,4 +170,53 @@ fn begin<'a>(encoder: &'a mut wgpu::CommandEncoder, label: &str) -> wgpu::Comput
         label: Some(label),
         timestamp_writes: None,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::PARAMS_BYTES;
+    use gpu_testkit::layout::{check_struct, struct_size};
+
+    macro_rules! members {
+        ($params:ty: $($name:ident),*) => {{
+            let params = <$params>::zeroed();
+            [$((
+                stringify!($name),
+                std::mem::offset_of!($params, $name) as u32,
+                size_of_val(&params.$name) as u32,
+            )),*]
+        }};
+    }
+
+    #[test]
+    fn uniforms_lie_where_the_host_writes_them() {
+        let lru = members!(LruParams: slots, slots_per_page, request_capacity, window_capacity);
+        for source in Service::sources() {
+            check_struct(&source.wgsl.source, "LruParams", &lru).unwrap();
+        }
+        let finish = members!(FinishParams: lru, jobs_per_group, pad0, pad1, pad2);
+        let [.., source] = Service::sources();
+        check_struct(&source.wgsl.source, "FinishParams", &finish).unwrap();
+        let bytes = struct_size(&source.wgsl.source, "FinishParams").unwrap();
+        assert_eq!(bytes as usize, size_of::<FinishParams>());
+        assert_eq!(size_of::<LruParams>() + size_of::<FinishParams>(), PARAMS_BYTES as usize);
+    }
+
+    // The header is a list of constants in WGSL, not a struct; the host knows a few of its words.
+    #[test]
+    fn the_header_has_the_words_that_the_host_reads() {
+        let [source, ..] = Service::sources();
+        let says = |name: &str, value: u64| {
+            let line = format!("const {name}: u32 = {value}u;");
+            assert!(source.wgsl.source.contains(&line), "{line}");
+        };
+        says("LRU_JOB_COUNT", JOB_COUNT_WORD);
+        says("LRU_HEADER", HEADER_WORDS);
+        let counters = ["REQUESTED", "DECODED", "EVICTED", "DEFERRED"];
+        for (word, name) in (COUNTER_WORD..).zip(counters) {
+            says(&format!("LRU_{name}_TOTAL"), word);
+        }
+        assert_eq!(Counters::BYTES.1, 16);
+    }
 }

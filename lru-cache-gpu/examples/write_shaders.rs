@@ -1,0 +1,10 @@
+//! Writes the composed text of every kernel of the crate to a folder, for tools that read WGSL:
+//! `cargo run -p lru-cache-gpu --example write_shaders -- FOLDER`.
+
+fn main() -> std::io::Result<()> {
+    let folder = std::path::PathBuf::from(std::env::args_os().nth(1).unwrap_or_default());
+    for source in lru_cache_gpu::Service::sources() {
+        std::fs::write(folder.join(format!("{}.wgsl", source.label)), source.wgsl.source)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,52 @@
+//! The plan says what is allocated.
+
+use gpu_primitives::memory::Category;
+use lru_cache_gpu::wgpu::Limits;
+use lru_cache_gpu::{CachePlan, MAX_PAGES, SLOT_BYTES};
+
+use crate::harness::{OnGpu, plan};
+
+fn binding(bytes: u64) -> Limits {
+    Limits { max_storage_buffer_binding_size: bytes, ..Limits::default() }
+}
+
+#[test]
+fn the_plan_counts_every_allocated_byte() {
+    let small = binding(1 << 14);
+    let plans = [
+        plan(1, 1, &Limits::default()),
+        plan(8, 8, &Limits::default()),
+        plan(5000, 8, &Limits::default()),
+        plan(5000, 5000, &Limits::default()),
+        plan(100_000, 70_001, &Limits::default()),
+        plan(300, 65, &small),
+        plan(300, 150, &small),
+    ];
+    let pages: Vec<_> = plans.iter().map(CachePlan::page_count).collect();
+    assert_eq!(pages, [1, 1, 1, 1, 1, 2, 3]);
+    for plan in &plans {
+        let cache = OnGpu::new(plan);
+        assert_eq!(cache.ledger.total(), plan.bytes(), "{plan:?}");
+        assert_eq!(cache.ledger.bytes(Category::Slots), plan.slot_bytes());
+        assert_eq!(cache.ledger.bytes(Category::Directory), plan.directory_bytes());
+        let sizes: Vec<_> = cache.buffers.slots().iter().map(|page| page.size()).collect();
+        let expected: Vec<_> = plan.pages().map(|slots| slots * SLOT_BYTES).collect();
+        assert_eq!(sizes, expected);
+        drop(cache.buffers);
+        assert_eq!(cache.ledger.total(), 0);
+    }
+}
+
+#[test]
+fn every_buffer_fits_a_binding() {
+    for bytes in [1 << 12, 1 << 14, 1 << 20, (1 << 20) + 4, 1 << 22] {
+        let limits = binding(bytes);
+        let blocks = bytes / 4;
+        let plan = CachePlan::fit(blocks, 1 << 40, &limits).unwrap();
+        assert!(plan.page_count() as u64 <= MAX_PAGES);
+        assert!(plan.pages().all(|slots| slots * SLOT_BYTES <= bytes));
+        let state = plan.directory_bytes() - 4 * blocks;
+        assert!(state <= bytes, "{state} bytes of state, {bytes} per binding");
+        assert_eq!(plan.slots(), blocks.min(MAX_PAGES * (bytes / SLOT_BYTES)));
+    }
+}

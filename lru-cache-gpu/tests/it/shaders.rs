@@ -1,0 +1,53 @@
+//! Every shader validates against core WebGPU and declares what the Rust side binds.
+
+use gpu_primitives::kernel::{Binding, KernelSource};
+use gpu_primitives::wgsl::{Module, compose};
+use gpu_testkit::layout::{BindingKind, check_bindings, validate_wgsl};
+use lru_cache_gpu::{Service, wgsl};
+
+use crate::harness::script_source;
+use crate::slots::sample_source;
+
+fn sources() -> Vec<KernelSource> {
+    let tests = [script_source(), sample_source(1), sample_source(2), sample_source(3)];
+    Service::sources().into_iter().chain(tests).collect()
+}
+
+fn kind(binding: &Binding) -> BindingKind {
+    match *binding {
+        Binding::Uniform { bytes } => BindingKind::Uniform { bytes },
+        Binding::StorageRead { min_bytes } => BindingKind::StorageRead { min_bytes },
+        Binding::StorageReadWrite { min_bytes } => BindingKind::StorageReadWrite { min_bytes },
+        ref other => panic!("unexpected {other:?}"),
+    }
+}
+
+#[test]
+fn shaders_are_valid_under_default_limits() {
+    for source in sources() {
+        validate_wgsl(&source.wgsl.source).unwrap_or_else(|e| panic!("{}: {e}", source.label));
+    }
+}
+
+#[test]
+fn shaders_declare_what_is_bound() {
+    for source in sources() {
+        let kinds: Vec<_> = source.bindings.iter().map(kind).collect();
+        check_bindings(&source.wgsl.source, source.entry_point, &kinds)
+            .unwrap_or_else(|e| panic!("{}: {e}", source.label));
+    }
+}
+
+#[test]
+fn lookup_alone_needs_only_a_read_only_directory() {
+    const TEXT: &str = "#import lru_lookup
+        @group(0) @binding(0) var<storage, read> lru_directory: array<u32>;
+        @group(0) @binding(1) var<storage, read_write> out: array<u32>;
+        @compute @workgroup_size(1) fn main() { out[0] = lru_lookup(out[1]); }";
+    let entry = Module { name: "lookup", source: TEXT };
+    let text = compose(entry, &wgsl::MODULES, &[]).unwrap().source;
+    validate_wgsl(&text).unwrap();
+    let kinds =
+        [BindingKind::StorageRead { min_bytes: 4 }, BindingKind::StorageReadWrite { min_bytes: 4 }];
+    check_bindings(&text, "main", &kinds).unwrap();
+}
