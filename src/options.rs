@@ -57,10 +57,13 @@ pub struct FrameOptions {
     /// Rounds of walk, request and decode per pass, at least 1. More rounds per pass mean fewer
     /// submissions and longer ones.
     pub rounds_per_pass: u32,
+    /// Active blocks that a stopped ray requests, the missing one included; at least 1, which means
+    /// no look-ahead. More need fewer passes and decode more.
+    pub look_ahead: u32,
 }
 
 impl Default for FrameOptions {
     fn default() -> Self {
-        Self { shading: Shading::default(), rounds_per_pass: 1 }
+        Self { shading: Shading::default(), rounds_per_pass: 1, look_ahead: 1 }
     }
 }

@@ -7,7 +7,8 @@ use gpu_primitives::upload::UploadRing;
 use lru_cache_gpu::{CacheBuffers, Service};
 use macrocell::{Activate, Masks, RangeBuffers};
 use wavefront::{
-    Draw, DrawBuffers, FrameView, OutputTextures, RunAhead, ShadingParams, WavefrontBuffers,
+    Draw, DrawBuffers, FrameView, OutputTextures, RayBuffers, Rays, RunAhead, RunAheadBuffers,
+    ShadingParams,
 };
 use web_time::Instant;
 use zfp_gpu::{Decode, DecodeBuffers, Payload};
@@ -75,6 +76,7 @@ struct Stages {
     activate: Activate,
     service: Service,
     decode: Decode,
+    rays: Rays,
     run_ahead: RunAhead,
     draw: Option<Draw>,
 }
@@ -83,7 +85,8 @@ struct Stages {
 #[derive(Debug)]
 struct Picture {
     textures: OutputTextures,
-    rays: WavefrontBuffers,
+    rays: RayBuffers,
+    run_ahead: RunAheadBuffers,
     draw: Option<DrawBuffers>,
 }
 
@@ -298,10 +301,12 @@ impl ProgressiveIsoRenderer {
             state.rounds += 1;
             let _span =
                 tracing::debug_span!("progressive_iso.round", round = state.rounds).entered();
-            self.stages.run_ahead.record_round(encoder, &mut self.picture.rays);
-            self.stages.service.record(encoder, &self.cache);
-            let args = self.cache.decode_args();
-            self.stages.decode.record_indirect(encoder, &self.decode, args, 0);
+            let (stages, cache, decode) = (&self.stages, &self.cache, &self.decode);
+            let Picture { rays, run_ahead, .. } = &mut self.picture;
+            stages.run_ahead.record_round(encoder, &stages.rays, rays, run_ahead, |encoder| {
+                stages.service.record(encoder, cache);
+                stages.decode.record_indirect(encoder, decode, cache.decode_args(), 0);
+            });
         }
         self.frame = Some(state);
     }
@@ -324,10 +329,11 @@ impl ProgressiveIsoRenderer {
             self.active_isovalue = Some(isovalue);
         }
         let grid = self.plan.macrocell.grid();
-        let params = state.view.params(grid, self.plan.cache.params(), isovalue);
+        let lru = self.plan.cache.params();
+        let params = state.view.params(grid, lru, isovalue, frame.options.look_ahead);
         let shading = ShadingParams::new(&frame.options.shading, self.volume.world_from_index);
         let rays = &mut self.picture.rays;
-        stages.run_ahead.record_start(device, encoder, &mut self.upload, rays, &params, &shading);
+        stages.rays.record_start(device, encoder, &mut self.upload, rays, &params, &shading);
         if let (Some(draw), Some(buffers)) = (&stages.draw, &self.picture.draw) {
             draw.record_params(device, encoder, &mut self.upload, buffers, &state.view);
         }
@@ -610,7 +616,8 @@ impl Stages {
             activate: Activate::new(device, plan.macrocell.grid().has_third_level()),
             service: Service::new(device),
             decode: Decode::new(device, pages)?,
-            run_ahead: RunAhead::new(device, plan.wavefront.outputs(), pages),
+            rays: Rays::new(device, plan.wavefront.outputs(), pages),
+            run_ahead: RunAhead::new(device, pages),
             draw: options.draw_target.map(|target| Draw::new(device, &target)),
         })
     }
@@ -627,18 +634,10 @@ impl Picture {
     ) -> Self {
         let wavefront = &plan.wavefront;
         let textures = OutputTextures::new(device, ledger, wavefront.outputs(), wavefront.size());
-        let masks = masks.buffer();
-        let rays = WavefrontBuffers::new(
-            device,
-            ledger,
-            &stages.run_ahead,
-            wavefront,
-            masks,
-            cache,
-            &textures,
-        );
+        let rays = RayBuffers::new(device, ledger, &stages.rays, wavefront, cache, &textures);
+        let run_ahead = stages.run_ahead.bind(device, &rays, masks.buffer(), cache);
         let draw =
             stages.draw.as_ref().and_then(|d| DrawBuffers::new(device, ledger, d, &textures));
-        Self { textures, rays, draw }
+        Self { textures, rays, run_ahead, draw }
     }
 }

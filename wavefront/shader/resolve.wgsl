@@ -3,7 +3,7 @@
 #import frame
 #import indirect
 #import lru_lookup
-#import lru_slots
+#import block_slots
 #import block_walk
 #import outputs
 

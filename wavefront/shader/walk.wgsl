@@ -4,7 +4,7 @@
 #import indirect
 #import macrocell_skip
 #import lru_request
-#import lru_slots
+#import block_slots
 #import block_walk
 
 @group(0) @binding(0) var<uniform> frame: FrameParams;
@@ -70,6 +70,22 @@ fn request_missing(block: vec3<i32>, need: u32, leads: bool) {
     }
 }
 
+// Requests what the ray will need in the next active blocks on its way, should they hold no hit.
+fn look_ahead(ray: DdaRay, start: MacrocellPlace) {
+    var place = start;
+    for (var ahead = 1u; ahead < frame.look_ahead; ahead++) {
+        place = macrocell_advance(frame.grid, ray, macrocell_leave(frame.grid, ray, place, 2u));
+        if (!macrocell_inside(frame.grid, place.cell)) {
+            return;
+        }
+        let block = place.cell >> vec3<u32>(2u);
+        let need = block_need(ray, place, dda_box(place.cell, 2u, frame.grid.last_cell));
+        if (!take_slots(block, need)) {
+            request_missing(block, need, false);
+        }
+    }
+}
+
 // The ray's new state.
 fn walk(ray: DdaRay, first_block: vec3<i32>, leads: bool) -> u32 {
     let first_box = dda_box(first_block * 4, 2u, frame.grid.last_cell);
@@ -85,6 +101,7 @@ fn walk(ray: DdaRay, first_block: vec3<i32>, leads: bool) -> u32 {
         let need = block_need(ray, place, box);
         if (!take_slots(block, need)) {
             request_missing(block, need, leads);
+            look_ahead(ray, place);
             return RAY_ACTIVE | macrocell_linear(block, frame.grid.blocks);
         }
         let result = block_walk(ray, place, box, frame.isovalue);

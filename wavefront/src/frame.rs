@@ -50,7 +50,7 @@ pub struct FrameParams {
     direction: [f32; 3],
     start_depth: f32,
     direction_dx: [f32; 3],
-    pad0: u32,
+    look_ahead: u32,
     direction_dy: [f32; 3],
     pad1: u32,
     grid: GridParams,
@@ -123,8 +123,15 @@ impl FrameView {
         })
     }
 
-    /// The uniform for the kernels.
-    pub fn params(&self, grid: Grid, lru: LruParams, isovalue: f32) -> FrameParams {
+    /// The uniform for the kernels. `look_ahead` is how many active blocks a stopped ray of
+    /// `RunAhead` requests, the missing one included (at least 1).
+    pub fn params(
+        &self,
+        grid: Grid,
+        lru: LruParams,
+        isovalue: f32,
+        look_ahead: u32,
+    ) -> FrameParams {
         let narrow = |v: DVec3| v.as_vec3().to_array();
         FrameParams {
             origin: narrow(self.origin[0]),
@@ -136,7 +143,7 @@ impl FrameView {
             direction: narrow(self.direction[0]),
             start_depth: self.start_depth as f32,
             direction_dx: narrow(self.direction[1]),
-            pad0: 0,
+            look_ahead: look_ahead.max(1),
             direction_dy: narrow(self.direction[2]),
             pad1: 0,
             grid: GridParams::new(grid),

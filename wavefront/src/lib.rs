@@ -6,6 +6,7 @@ mod error;
 pub mod frame;
 mod outputs;
 mod plan;
+mod rays;
 mod run_ahead;
 
 pub use camera::Camera;
@@ -17,4 +18,5 @@ pub use outputs::{
     DEPTH_NONE, Light, OutputTextures, Outputs, PixelStatus, Shading, ShadingParams,
 };
 pub use plan::WavefrontPlan;
-pub use run_ahead::{Counters, RunAhead, WavefrontBuffers};
+pub use rays::{Counters, RayBuffers, Rays};
+pub use run_ahead::{RunAhead, RunAheadBuffers};

@@ -2,7 +2,7 @@
 
 use gpu_primitives::kernel::{Binding, KernelSource};
 use gpu_testkit::layout::{self, BindingKind};
-use wavefront::{Outputs, RunAhead};
+use wavefront::{Outputs, Rays, RunAhead};
 
 fn kind(binding: &Binding) -> BindingKind {
     match *binding {
@@ -17,7 +17,8 @@ fn kind(binding: &Binding) -> BindingKind {
 fn check(source: &KernelSource) {
     let text = &source.wgsl.source;
     if let Ok(folder) = std::env::var("DUMP_WGSL") {
-        std::fs::write(format!("{folder}/{}.wgsl", source.label), text).unwrap();
+        std::fs::write(format!("{folder}/{}.wgsl", source.label), text)
+            .expect("the folder can be written");
     }
     layout::validate_wgsl(text).unwrap_or_else(|e| panic!("{}: {e}", source.label));
     let kinds: Vec<BindingKind> = source.bindings.iter().map(kind).collect();
@@ -28,9 +29,11 @@ fn check(source: &KernelSource) {
 #[test]
 fn kernels_validate_with_every_set_of_outputs_and_pages() {
     for bits in 0..8 {
-        let outputs = Outputs { depth: bits & 1 != 0, normal: bits & 2 != 0, status: bits & 4 != 0 };
+        let outputs =
+            Outputs { depth: bits & 1 != 0, normal: bits & 2 != 0, status: bits & 4 != 0 };
         for pages in 1..=3 {
-            RunAhead::sources(outputs, pages).iter().for_each(check);
+            Rays::sources(outputs, pages).iter().for_each(check);
+            check(&RunAhead::source(pages));
         }
     }
 }

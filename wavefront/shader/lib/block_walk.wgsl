@@ -1,8 +1,6 @@
-// A ray's way through the dual cells of one block whose samples are resident. Needs lru_sample.
+// A ray's way through the dual cells of one block whose samples are at hand. The importing text supplies
+// fn block_sample(x: i32, y: i32, z: i32) -> f32, the sample at 0 ..= 4 on each axis from the block's first.
 #import cell
-
-// Slots of the block (0) and its plus-side neighbours: bit 0 +x, bit 1 +y, bit 2 +z.
-var<private> block_slots: array<u32, 8>;
 
 struct BlockWalk {
     hit: bool,
@@ -14,7 +12,8 @@ struct BlockWalk {
     inside_low: bool,
 }
 
-// Which neighbours' samples the cells that the ray visits in `box` need, a bit for each of block_slots.
+// Which blocks' samples the cells that the ray visits in `box` need: bit 0 for the block itself, bit n for
+// the plus-side neighbour n = x + 2y + 4z.
 fn block_need(ray: DdaRay, start: MacrocellPlace, box: DdaBox) -> u32 {
     var need = 0u;
     var cell = start.cell;
@@ -34,11 +33,6 @@ fn block_next(ray: DdaRay, cell: vec3<i32>, exit: DdaEvent) -> vec3<i32> {
     var next = cell;
     next[exit.axis] += select(1, -1, ray.direction[exit.axis] < 0.0);
     return next;
-}
-
-fn block_sample(x: i32, y: i32, z: i32) -> f32 {
-    let slot = block_slots[(x >> 2u) | ((y >> 2u) << 1u) | ((z >> 2u) << 2u)];
-    return lru_sample(slot, u32((x & 3) | ((y & 3) << 2u) | ((z & 3) << 4u)));
 }
 
 fn block_corners(cell: vec3<i32>, isovalue: f32) -> CellCorners {

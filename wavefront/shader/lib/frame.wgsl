@@ -14,7 +14,7 @@ struct FrameParams {
     direction: vec3<f32>,
     start_depth: f32, // view depth of the rays' start, in world units
     direction_dx: vec3<f32>,
-    pad0: u32,
+    look_ahead: u32, // RunAhead: active blocks that a stopped ray requests, the missing one included
     direction_dy: vec3<f32>,
     pad1: u32,
     grid: MacrocellGrid,
