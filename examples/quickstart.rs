@@ -81,7 +81,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         },
     })?;
 
-    println!("pass  complete  decoded  active rays      ms");
+    println!("{}", PassEntry::HEAD);
     let mut passes: Vec<PassEntry> = Vec::new();
     let mut failure: Result<(), Failure> = Ok(());
     let begin = Instant::now();
@@ -90,14 +90,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
             return true;
         }
         let entry = PassEntry::new(report, begin.elapsed().as_secs_f64() * 1e3);
-        println!(
-            "{:4} {:8.2}% {:8} {:12} {:7.0}",
-            entry.pass,
-            entry.completeness * 100.0,
-            entry.blocks_decoded,
-            entry.active_rays,
-            entry.ms,
-        );
+        println!("{}", entry.line());
         let path = arguments.out.join(format!("pass_{:03}.png", entry.pass));
         failure = renderer
             .capture_blocking(&gpu.device, &gpu.queue)

@@ -9,51 +9,88 @@ use serde::Serialize;
 
 pub type Failure = Box<dyn std::error::Error>;
 
-/// A device on the adapter whose name contains `wanted`, or on the first that serves.
+/// Environment variable that names an adapter where no option does.
+pub const ADAPTER_VARIABLE: &str = "PROGRESSIVE_ISO_ADAPTER";
+
+/// A device on one of the adapters.
 pub struct Gpu {
     pub info: wgpu::AdapterInfo,
     pub device: wgpu::Device,
     pub queue: wgpu::Queue,
 }
 
-/// All adapters, the native APIs' before OpenGL's.
+/// All adapters, best first: the native APIs' before OpenGL's, hardware before software.
 pub fn adapters() -> Vec<wgpu::Adapter> {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
-    let mut adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
-    adapters.extend(pollster::block_on(instance.enumerate_adapters(wgpu::Backends::GL)));
-    adapters
+    [wgpu::Backends::PRIMARY, wgpu::Backends::GL]
+        .into_iter()
+        .flat_map(|backends| {
+            let mut found = pollster::block_on(instance.enumerate_adapters(backends));
+            found.sort_by_key(|adapter| match adapter.get_info().device_type {
+                wgpu::DeviceType::DiscreteGpu => 0,
+                wgpu::DeviceType::IntegratedGpu => 1,
+                wgpu::DeviceType::VirtualGpu => 2,
+                wgpu::DeviceType::Other => 3,
+                wgpu::DeviceType::Cpu => 4,
+            });
+            found
+        })
+        .collect()
+}
+
+/// Name and back end.
+pub fn adapter_name(info: &wgpu::AdapterInfo) -> String {
+    format!("{} ({:?})", info.name, info.backend)
+}
+
+/// The adapters whose names contain `wanted`, or else the value of [`ADAPTER_VARIABLE`], or all.
+/// At least one.
+pub fn matching_adapters(wanted: Option<&str>) -> Result<Vec<wgpu::Adapter>, Failure> {
+    let wanted = wanted.map(str::to_owned).or_else(|| std::env::var(ADAPTER_VARIABLE).ok());
+    let wanted = wanted.unwrap_or_default().to_lowercase();
+    let mut adapters = adapters();
+    let names: Vec<String> = adapters.iter().map(|a| adapter_name(&a.get_info())).collect();
+    adapters.retain(|a| adapter_name(&a.get_info()).to_lowercase().contains(&wanted));
+    if names.is_empty() {
+        Err("no GPU adapter found; on Debian and Ubuntu the package mesa-vulkan-drivers brings a \
+             software one"
+            .into())
+    } else if adapters.is_empty() {
+        Err(format!("no adapter's name contains \"{wanted}\"; there are {names:?}").into())
+    } else {
+        Ok(adapters)
+    }
 }
 
 impl Gpu {
+    /// A device on the best adapter whose name contains `wanted`.
     pub fn new(wanted: Option<&str>) -> Result<Self, Failure> {
-        let adapters = adapters();
-        let names: Vec<String> = adapters.iter().map(|a| a.get_info().name).collect();
-        let matches = |a: &&wgpu::Adapter| {
-            wanted.is_none_or(|w| a.get_info().name.to_lowercase().contains(&w.to_lowercase()))
-        };
-        let Some(adapter) = adapters.iter().find(matches) else {
-            return Err(match wanted {
-                Some(name) => format!("no adapter's name contains \"{name}\"; there are {names:?}"),
-                None => "no GPU adapter found; on Debian and Ubuntu the package \
-                         mesa-vulkan-drivers brings a software one"
-                    .into(),
+        Self::open(&matching_adapters(wanted)?)
+    }
+
+    /// A device on the first of the adapters that offers WebGPU's default limits.
+    pub fn open(adapters: &[wgpu::Adapter]) -> Result<Self, Failure> {
+        let mut refusals = String::new();
+        for adapter in adapters {
+            let features = adapter.features() & wgpu::Features::TIMESTAMP_QUERY;
+            let descriptor = wgpu::DeviceDescriptor {
+                label: Some("example"),
+                required_features: features,
+                ..Default::default()
+            };
+            match pollster::block_on(adapter.request_device(&descriptor)) {
+                Ok((device, queue)) => return Ok(Self { info: adapter.get_info(), device, queue }),
+                Err(error) => {
+                    let name = adapter_name(&adapter.get_info());
+                    refusals += &format!("{name} offers less than WebGPU asks for: {error}; ");
+                }
             }
-            .into());
-        };
-        let features = adapter.features() & wgpu::Features::TIMESTAMP_QUERY;
-        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
-            label: Some("example"),
-            required_features: features,
-            ..Default::default()
-        }))
-        .map_err(|error| {
-            format!("{} offers less than WebGPU asks for: {error}", adapter.get_info().name)
-        })?;
-        Ok(Self { info: adapter.get_info(), device, queue })
+        }
+        Err(refusals.trim_end_matches("; ").into())
     }
 
     pub fn name(&self) -> String {
-        format!("{} ({:?})", self.info.name, self.info.backend)
+        adapter_name(&self.info)
     }
 }
 
@@ -79,6 +116,21 @@ pub struct PassEntry {
 }
 
 impl PassEntry {
+    /// Heads of the columns of [`PassEntry::line`].
+    pub const HEAD: &str = "pass  complete  decoded  active rays      ms";
+
+    /// One line of a table.
+    pub fn line(&self) -> String {
+        format!(
+            "{:4} {:8.2}% {:8} {:12} {:7.0}",
+            self.pass,
+            self.completeness * 100.0,
+            self.blocks_decoded,
+            self.active_rays,
+            self.ms,
+        )
+    }
+
     pub fn new(report: &PassReport, ms: f64) -> Self {
         Self {
             pass: report.pass,
@@ -123,6 +175,10 @@ pub struct Report {
     pub bytes_by_category: Vec<(String, u64)>,
     /// Time to make pipelines and allocate memory, before the first pass.
     pub setup_ms: f64,
+    /// Finished share of the rays that enter the volume, after the last pass.
+    pub completeness: f64,
+    /// Whether every pixel is final.
+    pub complete: bool,
     pub passes: Vec<PassEntry>,
 }
 
@@ -162,6 +218,8 @@ impl Report {
                 .map(|(category, bytes)| (format!("{category:?}"), bytes))
                 .collect(),
             setup_ms,
+            completeness: passes.last().map_or(0.0, |p| p.completeness),
+            complete: passes.last().is_some_and(|p| p.active_rays == 0),
             passes,
         }
     }
@@ -178,7 +236,8 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
 
 pub fn write_png(path: &Path, capture: &Capture) -> Result<(), Failure> {
     let [width, height] = capture.size;
-    image::save_buffer(path, &capture.color, width, height, image::ColorType::Rgba8)
+    let (color, format) = (image::ColorType::Rgba8, image::ImageFormat::Png);
+    image::save_buffer_with_format(path, &capture.color, width, height, color, format)
         .map_err(|error| format!("cannot write {}: {error}", path.display()).into())
 }
 
