@@ -36,4 +36,22 @@ pub enum Error {
         /// Most pixels per axis under the device's limits.
         most_edge: u32,
     },
+    /// The start factor is out of range.
+    #[error("the start factor is {found}, expected 1 to 8")]
+    StartFactor {
+        /// Factor given.
+        found: u32,
+    },
+    /// The ray-block pairs must fit one binding.
+    #[error(
+        "{pairs} ray-block pairs need a binding of {needed} bytes, the device binds at most {available}"
+    )]
+    TooManyPairs {
+        /// Pixels times start factor.
+        pairs: u64,
+        /// Bytes of the pairs.
+        needed: u64,
+        /// Largest storage binding of the device in bytes.
+        available: u64,
+    },
 }

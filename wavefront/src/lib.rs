@@ -1,5 +1,7 @@
 #![doc = include_str!("../README.md")]
 
+#[cfg(feature = "block-sorted")]
+mod block_sorted;
 mod camera;
 pub mod draw;
 mod error;
@@ -8,7 +10,10 @@ mod outputs;
 mod plan;
 mod rays;
 mod run_ahead;
+mod strategy;
 
+#[cfg(feature = "block-sorted")]
+pub use block_sorted::{BlockSorted, BlockSortedOptions, BlockSortedPlan};
 pub use camera::Camera;
 pub use draw::{Draw, DrawBuffers, DrawTarget};
 pub use error::Error;
@@ -19,4 +24,5 @@ pub use outputs::{
 };
 pub use plan::WavefrontPlan;
 pub use rays::{Counters, RayBuffers, Rays};
-pub use run_ahead::{RunAhead, RunAheadBuffers};
+pub use run_ahead::RunAhead;
+pub use strategy::{MakeResident, Rounds, Scene, Statistics, Strategy};

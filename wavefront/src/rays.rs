@@ -68,6 +68,8 @@ pub struct Rays {
 /// Every module that a kernel of this crate may import.
 pub(crate) fn library() -> Vec<Module> {
     let mut modules = vec![FRAME, CELL, BLOCK_WALK, BLOCK_SLOTS, OUTPUTS, indirect::MODULE];
+    #[cfg(feature = "block-sorted")]
+    modules.push(crate::block_sorted::PAIRS);
     modules.extend(macrocell::wgsl::MODULES);
     modules.extend(lru_cache_gpu::wgsl::MODULES);
     modules
@@ -80,10 +82,11 @@ pub(crate) fn source(
     module: Module,
     mut bindings: Vec<Binding>,
     slot_pages: u32,
+    constants: &[(&'static str, Constant)],
     pictures: Option<Outputs>,
 ) -> KernelSource {
-    let mut constants: Vec<(&str, Constant)> =
-        lru_cache_gpu::wgsl::page_constants(slot_pages).to_vec();
+    let mut constants = constants.to_vec();
+    constants.extend(lru_cache_gpu::wgsl::page_constants(slot_pages));
     if let Some(outputs) = pictures {
         constants.extend(outputs.constants(bindings.len() as u32));
         bindings.extend(outputs.bindings());
@@ -106,8 +109,8 @@ impl Rays {
         let mut resolve = vec![FRAME_PARAMS, shading, RAYS, READ, WRITE, READ];
         resolve.extend(vec![SLOTS; slot_pages as usize]);
         [
-            source("wavefront.start", START, start, slot_pages, Some(outputs)),
-            source("wavefront.resolve", RESOLVE, resolve, slot_pages, Some(outputs)),
+            source("wavefront.start", START, start, slot_pages, &[], Some(outputs)),
+            source("wavefront.resolve", RESOLVE, resolve, slot_pages, &[], Some(outputs)),
         ]
     }
 

@@ -34,6 +34,8 @@ fn kernels_validate_with_every_set_of_outputs_and_pages() {
         for pages in 1..=3 {
             Rays::sources(outputs, pages).iter().for_each(check);
             check(&RunAhead::source(pages));
+            #[cfg(feature = "block-sorted")]
+            wavefront::BlockSorted::sources(pages).iter().for_each(check);
         }
     }
 }

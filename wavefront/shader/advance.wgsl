@@ -1,0 +1,58 @@
+// Every active ray's next active blocks, in order, and where it goes on after them.
+#import frame
+#import indirect
+#import macrocell_skip
+#import pairs
+
+@group(0) @binding(0) var<uniform> frame: FrameParams;
+@group(0) @binding(1) var<storage, read_write> rays: array<u32>;
+@group(0) @binding(2) var<storage, read> active_rays: array<u32>;
+@group(0) @binding(3) var<storage, read> masks: array<vec2<u32>>;
+@group(0) @binding(4) var<storage, read_write> pairs: array<u32>;
+
+fn macrocell_mask(index: u32) -> vec2<u32> {
+    return masks[index];
+}
+
+// The ray's state before the first pair is composited: the block after its last pair, or done.
+fn advance(ray: DdaRay, first_block: vec3<i32>, first_pair: u32, count: u32) -> u32 {
+    let box = dda_box(first_block * 4, 2u, frame.grid.last_cell);
+    let entry = dda_entry(ray, box);
+    var place = macrocell_advance(
+        frame.grid, ray, MacrocellPlace(entry, dda_cell_after(ray, entry, box)));
+    for (var k = 0u; k < count; k++) {
+        if (!macrocell_inside(frame.grid, place.cell)) {
+            pairs[PAIRS_HEADER + first_pair + k] = PAIR_NONE;
+            continue;
+        }
+        let block = macrocell_linear(place.cell >> vec3<u32>(2u), frame.grid.blocks);
+        pairs[PAIRS_HEADER + first_pair + k] = PAIR_WAITS | block;
+        place = macrocell_advance(
+            frame.grid, ray, macrocell_leave(frame.grid, ray, place, 2u));
+    }
+    if (!macrocell_inside(frame.grid, place.cell)) {
+        return RAY_DONE;
+    }
+    return RAY_ACTIVE | macrocell_linear(place.cell >> vec3<u32>(2u), frame.grid.blocks);
+}
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let index = indirect_linear_group(group, groups) * 64u + lane;
+    if (index >= rays[RAYS_ACTIVE]) {
+        return;
+    }
+    let id = active_rays[index];
+    let ray = frame_ray(frame, frame_pixel(frame, id)).ray;
+    let block = frame_block_position(frame, rays[RAYS_HEADER + id] & RAY_BLOCK);
+#ifdef EMPTY_SPACE_STEP
+    rays[RAYS_HEADER + id] = advance(ray, block, 0u, 0u);
+#else
+    let count = pairs[PAIRS_SPECULATION];
+    rays[RAYS_HEADER + id] = advance(ray, block, index * count, count);
+#endif
+}
