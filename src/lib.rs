@@ -13,11 +13,13 @@ mod volume;
 pub use capture::{Capture, PendingCapture};
 pub use error::Error;
 pub use gpu_primitives::memory::Category;
-pub use options::{Frame, FrameOptions, RendererOptions};
+pub use options::{Frame, FrameOptions, RendererOptions, TraversalStrategy};
 pub use plan::{Part, ScenePlan};
 pub use renderer::ProgressiveIsoRenderer;
 pub use report::PassReport;
 pub use volume::{CompressedVolume, StreamBytes};
+#[cfg(feature = "block-sorted")]
+pub use wavefront::BlockSortedOptions;
 pub use wavefront::{
     Camera, DEPTH_NONE, DrawTarget, FrameView, Light, OutputTextures, Outputs, PixelStatus, Shading,
 };

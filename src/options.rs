@@ -2,6 +2,19 @@
 
 use wavefront::{Camera, DrawTarget, Outputs, Shading};
 
+/// How rays find the surface. All strategies make the same picture, bit for bit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum TraversalStrategy {
+    /// Every ray walks on through everything that is resident and stops only at missing samples.
+    #[default]
+    RunAhead,
+    /// The published algorithm: every round takes each ray to its next n active blocks and
+    /// intersects block by block.
+    #[cfg(feature = "block-sorted")]
+    BlockSorted(wavefront::BlockSortedOptions),
+}
+
 /// Choices that hold for the life of a renderer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RendererOptions {
@@ -15,6 +28,8 @@ pub struct RendererOptions {
     pub draw_target: Option<DrawTarget>,
     /// Whether pictures will be read back with [`crate::ProgressiveIsoRenderer::capture`].
     pub capture: bool,
+    /// How rays find the surface.
+    pub strategy: TraversalStrategy,
 }
 
 impl Default for RendererOptions {
@@ -26,6 +41,7 @@ impl Default for RendererOptions {
             outputs: Outputs::default(),
             draw_target: None,
             capture: false,
+            strategy: TraversalStrategy::RunAhead,
         }
     }
 }
@@ -57,7 +73,7 @@ pub struct FrameOptions {
     /// Rounds of walk, request and decode per pass, at least 1. More rounds per pass mean fewer
     /// submissions and longer ones.
     pub rounds_per_pass: u32,
-    /// Active blocks that a stopped ray requests, the missing one included; at least 1, which means
+    /// `RunAhead`: active blocks that a stopped ray requests, the missing one included; at least 1, which means
     /// no look-ahead. More need fewer passes and decode more.
     pub look_ahead: u32,
 }

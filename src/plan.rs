@@ -9,7 +9,7 @@ use zfp_gpu::{DecodeBuffers, ExtremaBuffers, PayloadPlan};
 
 use crate::load::LoadPlan;
 use crate::renderer::READBACK_BYTES;
-use crate::{CompressedVolume, Error, RendererOptions, capture, wgpu};
+use crate::{CompressedVolume, Error, RendererOptions, TraversalStrategy, capture, wgpu};
 
 /// Passes that may be in flight.
 pub(crate) const PASSES_IN_FLIGHT: usize = 2;
@@ -42,6 +42,7 @@ pub struct ScenePlan {
     pub(crate) load: LoadPlan,
     pub(crate) cache: CachePlan,
     pub(crate) wavefront: WavefrontPlan,
+    pub(crate) strategy: StrategyPlan,
     parts: Vec<Part>,
     budget_bytes: u64,
 }
@@ -66,14 +67,19 @@ impl ScenePlan {
         let mut parts = fixed_parts(options, &payload, &macrocell, &load, &wavefront);
         let fixed: u64 = parts.iter().map(|part| part.bytes).sum();
         let blocks = macrocell.grid().block_count();
-        let minimum = fixed + CachePlan::minimum_bytes(blocks);
-        let budget = options.budget_bytes;
-        if minimum > budget {
-            return Err(Error::BudgetTooSmall { minimum, budget });
+        let strategy = StrategyPlan::new(options.strategy, wavefront.rays(), limits)?;
+        let minimum = fixed
+            + CachePlan::minimum_bytes(blocks)
+            + strategy.bytes(CachePlan::least_slots(blocks));
+        let budget_bytes = options.budget_bytes;
+        if minimum > budget_bytes {
+            return Err(Error::BudgetTooSmall { minimum, budget: budget_bytes });
         }
-        let cache = CachePlan::fit(blocks, budget - fixed, limits)?;
+        let beside = |slots| strategy.bytes(slots);
+        let cache = CachePlan::fit_beside(blocks, budget_bytes - fixed, limits, beside)?;
+        parts.push(strategy.part(cache.slots()));
         parts.push(cache_part(&cache, blocks));
-        Ok(Self { payload, macrocell, load, cache, wavefront, parts, budget_bytes: budget })
+        Ok(Self { payload, macrocell, load, cache, wavefront, strategy, parts, budget_bytes })
     }
 
     /// The same scene with one pixel and the smallest cache, for the time of a change of size.
@@ -81,7 +87,8 @@ impl ScenePlan {
         let blocks = self.blocks();
         let cache = CachePlan::fit(blocks, CachePlan::minimum_bytes(blocks), limits)?;
         let wavefront = WavefrontPlan::new([1, 1], self.wavefront.outputs(), limits)?;
-        Ok(Self { cache, wavefront, ..self.clone() })
+        let strategy = self.strategy.shrunk(limits)?;
+        Ok(Self { cache, wavefront, strategy, ..self.clone() })
     }
 
     /// The parts, in or left out.
@@ -128,6 +135,62 @@ impl ScenePlan {
         let budget = format!("of a budget of {}", self.budget_bytes);
         text += &line("total", &self.bytes().to_string(), &budget);
         text
+    }
+}
+
+/// What the chosen strategy allocates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum StrategyPlan {
+    RunAhead,
+    #[cfg(feature = "block-sorted")]
+    BlockSorted(wavefront::BlockSortedOptions, wavefront::BlockSortedPlan),
+}
+
+impl StrategyPlan {
+    fn new(strategy: TraversalStrategy, rays: u64, limits: &wgpu::Limits) -> Result<Self, Error> {
+        match strategy {
+            TraversalStrategy::RunAhead => {
+                debug_assert!(rays > 0 && limits.max_buffer_size > 0, "checked by the other plans");
+                Ok(Self::RunAhead)
+            }
+            #[cfg(feature = "block-sorted")]
+            TraversalStrategy::BlockSorted(options) => {
+                let plan = wavefront::BlockSortedPlan::new(rays, options, limits)?;
+                Ok(Self::BlockSorted(options, plan))
+            }
+        }
+    }
+
+    /// The same for one ray.
+    fn shrunk(self, limits: &wgpu::Limits) -> Result<Self, Error> {
+        match self {
+            Self::RunAhead => Self::new(TraversalStrategy::RunAhead, 1, limits),
+            #[cfg(feature = "block-sorted")]
+            Self::BlockSorted(options, _) => {
+                Self::new(TraversalStrategy::BlockSorted(options), 1, limits)
+            }
+        }
+    }
+
+    /// Bytes beside rays and pictures, with a cache of `slots` slots.
+    fn bytes(&self, slots: u64) -> u64 {
+        match self {
+            Self::RunAhead => 0,
+            #[cfg(feature = "block-sorted")]
+            Self::BlockSorted(_, plan) => plan.bytes(slots),
+        }
+    }
+
+    fn part(&self, slots: u64) -> Part {
+        match self {
+            Self::RunAhead => left_out("block pairs", "strategy RunAhead"),
+            #[cfg(feature = "block-sorted")]
+            Self::BlockSorted(options, _) => part(
+                "block pairs",
+                self.bytes(slots),
+                format!("strategy BlockSorted, start factor {}", options.start_factor),
+            ),
+        }
     }
 }
 

@@ -7,15 +7,15 @@ use gpu_primitives::upload::UploadRing;
 use lru_cache_gpu::{CacheBuffers, Service};
 use macrocell::{Activate, Masks, RangeBuffers};
 use wavefront::{
-    Draw, DrawBuffers, FrameView, OutputTextures, RayBuffers, Rays, RunAhead, RunAheadBuffers,
-    ShadingParams,
+    Draw, DrawBuffers, FrameView, OutputTextures, RayBuffers, Rays, Rounds, RunAhead, Scene,
+    ShadingParams, Statistics, Strategy,
 };
 use web_time::Instant;
 use zfp_gpu::{Decode, DecodeBuffers, Payload};
 
 use crate::capture::PendingCapture;
 use crate::load::Loader;
-use crate::plan::{PARAMS_CHUNK, PASSES_IN_FLIGHT};
+use crate::plan::{PARAMS_CHUNK, PASSES_IN_FLIGHT, StrategyPlan};
 use crate::timing::Timer;
 use crate::{CompressedVolume, Error, Frame, PassReport, RendererOptions, ScenePlan, wgpu};
 
@@ -32,6 +32,7 @@ struct PassRecord {
     cache_before: lru_cache_gpu::Counters,
     /// GPU clock ticks at the pass's begin and end, two words each; 0 without timestamps.
     ticks: [u32; 4],
+    statistics: Statistics,
 }
 
 /// Bytes of a [`PassRecord`].
@@ -77,7 +78,7 @@ struct Stages {
     service: Service,
     decode: Decode,
     rays: Rays,
-    run_ahead: RunAhead,
+    strategy: Box<dyn Strategy>,
     draw: Option<Draw>,
 }
 
@@ -86,7 +87,7 @@ struct Stages {
 struct Picture {
     textures: OutputTextures,
     rays: RayBuffers,
-    run_ahead: RunAheadBuffers,
+    rounds: Box<dyn Rounds>,
     draw: Option<DrawBuffers>,
 }
 
@@ -302,8 +303,8 @@ impl ProgressiveIsoRenderer {
             let _span =
                 tracing::debug_span!("progressive_iso.round", round = state.rounds).entered();
             let (stages, cache, decode) = (&self.stages, &self.cache, &self.decode);
-            let Picture { rays, run_ahead, .. } = &mut self.picture;
-            stages.run_ahead.record_round(encoder, &stages.rays, rays, run_ahead, |encoder| {
+            let Picture { rays, rounds, .. } = &mut self.picture;
+            rounds.record_round(encoder, &stages.rays, rays, &mut |encoder| {
                 stages.service.record(encoder, cache);
                 stages.decode.record_indirect(encoder, decode, cache.decode_args(), 0);
             });
@@ -332,8 +333,9 @@ impl ProgressiveIsoRenderer {
         let lru = self.plan.cache.params();
         let params = state.view.params(grid, lru, isovalue, frame.options.look_ahead);
         let shading = ShadingParams::new(&frame.options.shading, self.volume.world_from_index);
-        let rays = &mut self.picture.rays;
+        let Picture { rays, rounds, .. } = &mut self.picture;
         stages.rays.record_start(device, encoder, &mut self.upload, rays, &params, &shading);
+        rounds.record_start(encoder, &stages.rays, rays);
         if let (Some(draw), Some(buffers)) = (&stages.draw, &self.picture.draw) {
             draw.record_params(device, encoder, &mut self.upload, buffers, &state.view);
         }
@@ -353,7 +355,8 @@ impl ProgressiveIsoRenderer {
             (self.cache.state(), cache_offset, cache_bytes),
             (&*self.cache_before, 0, cache_bytes),
         ];
-        parts.extend(self.timer.part());
+        parts.push(self.timer.part());
+        parts.extend(self.picture.rounds.statistics());
         let tag = self.submitted.last().map_or(1, |s| s.tag + 1);
         if self.readback.record(device, encoder, &parts, tag) {
             let (frame, pass, rounds) = match &self.frame {
@@ -400,6 +403,9 @@ impl ProgressiveIsoRenderer {
         report.hits = record.rays.hits;
         report.blocks_requested = since(record.cache.requested, record.cache_before.requested);
         report.blocks_decoded = since(record.cache.decoded, record.cache_before.decoded);
+        report.speculation = record.statistics.speculation;
+        report.ray_block_pairs = record.statistics.pairs;
+        report.visible_blocks = record.statistics.visible_blocks;
         report.blocks_evicted = since(record.cache.evicted, record.cache_before.evicted);
     }
 
@@ -604,6 +610,17 @@ fn cache(
     Ok((cache, decode))
 }
 
+fn strategy(device: &wgpu::Device, plan: &ScenePlan) -> Box<dyn Strategy> {
+    let pages = plan.cache.page_count();
+    match plan.strategy {
+        StrategyPlan::RunAhead => Box::new(RunAhead::new(device, pages)),
+        #[cfg(feature = "block-sorted")]
+        StrategyPlan::BlockSorted(_, plan) => {
+            Box::new(wavefront::BlockSorted::new(device, pages, plan))
+        }
+    }
+}
+
 impl Stages {
     fn new(
         device: &wgpu::Device,
@@ -617,7 +634,7 @@ impl Stages {
             service: Service::new(device),
             decode: Decode::new(device, pages)?,
             rays: Rays::new(device, plan.wavefront.outputs(), pages),
-            run_ahead: RunAhead::new(device, pages),
+            strategy: strategy(device, plan),
             draw: options.draw_target.map(|target| Draw::new(device, &target)),
         })
     }
@@ -635,9 +652,10 @@ impl Picture {
         let wavefront = &plan.wavefront;
         let textures = OutputTextures::new(device, ledger, wavefront.outputs(), wavefront.size());
         let rays = RayBuffers::new(device, ledger, &stages.rays, wavefront, cache, &textures);
-        let run_ahead = stages.run_ahead.bind(device, &rays, masks.buffer(), cache);
+        let scene = Scene { rays: &rays, masks: masks.buffer(), cache };
+        let rounds = stages.strategy.bind(device, ledger, scene);
         let draw =
             stages.draw.as_ref().and_then(|d| DrawBuffers::new(device, ledger, d, &textures));
-        Self { textures, rays, run_ahead, draw }
+        Self { textures, rays, rounds, draw }
     }
 }

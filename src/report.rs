@@ -33,6 +33,12 @@ pub struct PassReport {
     pub blocks_decoded: u32,
     /// Blocks evicted in this frame.
     pub blocks_evicted: u32,
+    /// `BlockSorted`: blocks that every ray went ahead in the pass's last round; 0 otherwise.
+    pub speculation: u32,
+    /// `BlockSorted`: ray-block pairs of the pass's last round; 0 otherwise.
+    pub ray_block_pairs: u32,
+    /// `BlockSorted`: blocks intersected in the pass's last round; 0 otherwise.
+    pub visible_blocks: u32,
     /// CPU time of recording the described pass, in milliseconds.
     pub cpu_ms: f64,
     /// GPU time of the described pass in milliseconds, where the device has timestamp queries.

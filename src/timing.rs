@@ -8,12 +8,13 @@ use crate::wgpu;
 #[derive(Debug)]
 pub(crate) struct Timer {
     queries: Option<Queries>,
+    /// Two 64-bit ticks; zeros without timestamps.
+    resolved: Buffer,
 }
 
 #[derive(Debug)]
 struct Queries {
     set: wgpu::QuerySet,
-    resolved: Buffer,
     nanoseconds_per_tick: f32,
 }
 
@@ -22,26 +23,28 @@ impl Timer {
     pub(crate) const BYTES: u64 = 16;
 
     pub(crate) fn new(device: &wgpu::Device, queue: &wgpu::Queue, ledger: &Ledger) -> Self {
-        if !device.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
-            return Self { queries: None };
-        }
-        let set = device.create_query_set(&wgpu::QuerySetDescriptor {
-            label: Some("progressive-iso.timestamps"),
-            ty: wgpu::QueryType::Timestamp,
-            count: 2,
-        });
+        let timed = device.features().contains(wgpu::Features::TIMESTAMP_QUERY);
+        let resolve =
+            if timed { wgpu::BufferUsages::QUERY_RESOLVE } else { wgpu::BufferUsages::empty() };
         let resolved = ledger.buffer(
             device,
             Category::Readback,
             &wgpu::BufferDescriptor {
                 label: Some("progressive-iso.timestamps"),
                 size: Self::BYTES,
-                usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
+                usage: resolve | wgpu::BufferUsages::COPY_SRC,
                 mapped_at_creation: false,
             },
         );
-        let nanoseconds_per_tick = queue.get_timestamp_period();
-        Self { queries: Some(Queries { set, resolved, nanoseconds_per_tick }) }
+        let queries = timed.then(|| Queries {
+            set: device.create_query_set(&wgpu::QuerySetDescriptor {
+                label: Some("progressive-iso.timestamps"),
+                ty: wgpu::QueryType::Timestamp,
+                count: 2,
+            }),
+            nanoseconds_per_tick: queue.get_timestamp_period(),
+        });
+        Self { queries, resolved }
     }
 
     pub(crate) fn record_begin(&self, encoder: &mut wgpu::CommandEncoder) {
@@ -51,7 +54,7 @@ impl Timer {
     pub(crate) fn record_end(&self, encoder: &mut wgpu::CommandEncoder) {
         self.record(encoder, None, Some(1));
         if let Some(queries) = &self.queries {
-            encoder.resolve_query_set(&queries.set, 0..2, &queries.resolved, 0);
+            encoder.resolve_query_set(&queries.set, 0..2, &self.resolved, 0);
         }
     }
 
@@ -70,8 +73,8 @@ impl Timer {
     }
 
     /// What to read back: two 64-bit ticks.
-    pub(crate) fn part(&self) -> Option<(&wgpu::Buffer, u64, u64)> {
-        self.queries.as_ref().map(|q| (&*q.resolved, 0, Self::BYTES))
+    pub(crate) fn part(&self) -> (&wgpu::Buffer, u64, u64) {
+        (&self.resolved, 0, Self::BYTES)
     }
 
     pub(crate) fn milliseconds(&self, ticks: [u32; 4]) -> Option<f64> {

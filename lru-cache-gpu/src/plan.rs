@@ -62,6 +62,20 @@ impl CachePlan {
     /// # Errors
     /// If the directory exceeds a binding, or `bytes` is less than [`CachePlan::minimum_bytes`].
     pub fn fit(blocks: u64, bytes: u64, limits: &wgpu::Limits) -> Result<Self, Error> {
+        Self::fit_beside(blocks, bytes, limits, |_| 0)
+    }
+
+    /// Like [`CachePlan::fit`] where others allocate memory of their own, `beside(slots)` bytes, a
+    /// function that does not decrease with the number of slots.
+    ///
+    /// # Errors
+    /// As [`CachePlan::fit`]; the minimum includes what the others need.
+    pub fn fit_beside(
+        blocks: u64,
+        bytes: u64,
+        limits: &wgpu::Limits,
+        beside: impl Fn(u64) -> u64,
+    ) -> Result<Self, Error> {
         let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let directory = blocks * 4;
         if directory > binding {
@@ -71,16 +85,17 @@ impl CachePlan {
         let slots_per_page = (binding / SLOT_BYTES).max(1);
         let most = blocks.min(slots_per_page * MAX_PAGES).min(state_slots);
         let with = |slots| Self { blocks, slots, slots_per_page };
+        let needed = |slots| with(slots).bytes() + beside(slots);
         let least = Self::least_slots(blocks);
-        if with(least).bytes() > bytes {
-            let minimum = with(least).bytes();
+        let minimum = needed(least);
+        if minimum > bytes {
             return Err(Error::TooFewBytes { blocks, minimum, available: bytes });
         }
-        // bytes() does not decrease with slots: the largest fitting count, by bisection.
+        // needed() does not decrease with slots: the largest fitting count, by bisection.
         let (mut fits, mut beyond) = (least, most.max(least) + 1);
         while beyond - fits > 1 {
             let middle = fits + (beyond - fits) / 2;
-            if with(middle).bytes() <= bytes {
+            if needed(middle) <= bytes {
                 fits = middle;
             } else {
                 beyond = middle;
@@ -96,7 +111,8 @@ impl CachePlan {
         if words <= 3 * MAX_REQUESTS { words / 3 } else { (words - MAX_REQUESTS) / 2 }
     }
 
-    fn least_slots(blocks: u64) -> u64 {
+    /// Slots of the smallest cache for a volume of `blocks` blocks.
+    pub fn least_slots(blocks: u64) -> u64 {
         blocks.clamp(1, LEADER_BLOCKS)
     }
 
