@@ -88,8 +88,12 @@ impl Masks {
                 (params, bind)
             })
             .collect();
-        let third_level = stage.third_level.as_ref().map(|kernel| {
-            let grid = plan.grid();
+        let grid = plan.grid();
+        if grid.has_third_level() && stage.third_level.is_none() {
+            tracing::error!(dims = ?grid.dims(), "the stage was made without a third level");
+        }
+        let kernel = stage.third_level.as_ref().filter(|_| grid.has_third_level());
+        let third_level = kernel.map(|kernel| {
             let params = params(bytemuck::bytes_of(&ThirdLevelParams {
                 coarse: grid.coarse(),
                 coarse_count: grid.coarse_count() as u32,
@@ -116,7 +120,8 @@ impl Masks {
 }
 
 impl Activate {
-    /// Makes the pipelines; the third level's only when there is one.
+    /// Makes the pipelines; the third level's only when one of the volumes has one
+    /// ([`crate::Grid::has_third_level`]): without it such a volume would look empty.
     pub fn new(device: &wgpu::Device, third_level: bool) -> Self {
         Self {
             activate: Self::source().kernel(device),
@@ -178,5 +183,27 @@ impl Activate {
         if let (Some(kernel), Some((_, bind))) = (&self.third_level, &masks.third_level) {
             kernel.dispatch(&mut pass, bind, plan.grid().third_count().div_ceil(64));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gpu_testkit::layout::{check_struct, struct_size};
+
+    #[test]
+    fn uniforms_lie_where_the_host_writes_them() {
+        let text = Activate::source().wgsl.source;
+        let params = members!(ActivateParams: page_first, page_count, isovalue, pad0);
+        check_struct(&text, "ActivateParams", &params).unwrap();
+        assert_eq!(
+            struct_size(&text, "ActivateParams").unwrap() as usize,
+            size_of::<ActivateParams>()
+        );
+        let text = Activate::third_level_source().wgsl.source;
+        let params = members!(ThirdLevelParams: coarse, coarse_count, third, third_count);
+        check_struct(&text, "ThirdLevelParams", &params).unwrap();
+        let bytes = struct_size(&text, "ThirdLevelParams").unwrap();
+        assert_eq!(bytes as usize, size_of::<ThirdLevelParams>());
     }
 }

@@ -1,5 +1,18 @@
 #![doc = include_str!("../README.md")]
 
+/// Name, byte offset and byte size of the members of a uniform struct.
+#[cfg(test)]
+macro_rules! members {
+    ($params:ty: $($name:ident),*) => {{
+        let params = <$params as bytemuck::Zeroable>::zeroed();
+        [$((
+            stringify!($name),
+            std::mem::offset_of!($params, $name) as u32,
+            size_of_val(&params.$name) as u32,
+        )),*]
+    }};
+}
+
 pub mod activate;
 pub mod cpu;
 mod error;

@@ -202,3 +202,18 @@ impl Ranges {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gpu_testkit::layout::{check_struct, struct_size};
+
+    #[test]
+    fn uniforms_lie_where_the_host_writes_them() {
+        let text = Ranges::source().wgsl.source;
+        let params = members!(RangesParams: blocks, page_first, coarse, page_count, region_origin, region_groups, region_blocks, pad0,
+            region_coarse, pad1, cells, pad2);
+        check_struct(&text, "RangesParams", &params).unwrap();
+        assert_eq!(struct_size(&text, "RangesParams").unwrap() as usize, size_of::<RangesParams>());
+    }
+}

@@ -128,7 +128,8 @@ fn dda_meets(ray: DdaRay, box: DdaBox) -> bool {
             return false;
         }
     }
-    return dda_before(dda_entry(ray, box), dda_exit(ray, box));
+    // Far from the origin both may be crossings of one axis with equal parameters.
+    return !dda_before(dda_exit(ray, box), dda_entry(ray, box));
 }
 
 // The box of 2^level cells on each axis that holds `cell`, cut off at the volume's last cells.

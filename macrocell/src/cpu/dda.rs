@@ -109,7 +109,8 @@ impl Ray {
             self.direction[axis] == 0.0
                 && (origin < bounds.low[axis] as f32 || origin > (bounds.high[axis] + 1) as f32)
         });
-        !outside_slab && self.entry(bounds).before(self.exit(bounds))
+        // Far from the origin both may be crossings of one axis with equal parameters.
+        !outside_slab && !self.exit(bounds).before(self.entry(bounds))
     }
 }
 
