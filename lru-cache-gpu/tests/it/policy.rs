@@ -105,6 +105,24 @@ fn the_leader_is_served_even_if_every_slot_is_in_use() {
 }
 
 #[test]
+fn the_leader_never_takes_a_slot_that_it_needs_itself() {
+    for slots in [8, 9, 66] {
+        let mut cache = cache(400, slots);
+        cache.round(&Round::uses(0..slots as u32));
+        for round in 0..20 {
+            // Four blocks after the hand, which the search meets first, and four absent ones.
+            let hand = cache.twin.state[2];
+            let next = (0..4).map(|i| (hand + i) % slots as u32);
+            let own: Vec<_> = next.filter_map(|slot| cache.twin.owner(slot)).collect();
+            let absent = 200 + 4 * round..204 + 4 * round;
+            let all = Round::uses(resident(&cache.twin));
+            let served = cache.round(&all.leads(own.into_iter().chain(absent)));
+            assert_eq!(served.jobs.len(), 4, "{slots} slots, round {round}");
+        }
+    }
+}
+
+#[test]
 fn the_leader_prefers_slots_that_nobody_uses() {
     let mut cache = cache(200, 60);
     cache.round(&Round::uses(0..50));
