@@ -19,8 +19,8 @@ use gpu_primitives::wgsl::{Constant, Module};
 
 use crate::Error;
 use crate::rays::{
-    FRAME_PARAMS, RAYS, RAYS_PER_GROUP, READ, RayBuffers, Rays, SLOTS, WRITE, begin, resources,
-    source,
+    FRAME_PARAMS, MASKS, RAYS, RAYS_PER_GROUP, READ, RayBuffers, Rays, SLOTS, WRITE, begin,
+    resources, source,
 };
 use crate::strategy::{MakeResident, Rounds, Scene, Strategy};
 
@@ -150,7 +150,7 @@ impl BlockSorted {
     /// Texts and bindings of the kernels.
     pub fn sources(slot_pages: u32) -> [KernelSource; 8] {
         let pairs = Binding::StorageReadWrite { min_bytes: 4 * (PAIRS_HEADER_WORDS + 2) };
-        let advance = vec![FRAME_PARAMS, RAYS, READ, READ, pairs];
+        let advance = vec![FRAME_PARAMS, RAYS, READ, MASKS, pairs];
         let grouping = vec![FRAME_PARAMS, pairs, READ, WRITE];
         let mut intersect = vec![FRAME_PARAMS, READ, pairs, READ, READ, READ];
         intersect.extend(vec![SLOTS; slot_pages as usize]);

@@ -31,6 +31,10 @@ pub(crate) const RAYS_PER_GROUP: u32 = 64;
 pub(crate) const RAYS: Binding = Binding::StorageReadWrite { min_bytes: 4 * RAYS_HEADER_WORDS + 4 };
 /// Binding of anything that is only read.
 pub(crate) const READ: Binding = Binding::StorageRead { min_bytes: 4 };
+/// Binding of the active masks, two words each.
+pub(crate) const MASKS: Binding = Binding::StorageRead { min_bytes: 8 };
+/// Binding of the active masks.
+pub(crate) const MASKS: Binding = Binding::StorageRead { min_bytes: 8 };
 /// Binding of anything that is written.
 pub(crate) const WRITE: Binding = Binding::StorageReadWrite { min_bytes: 4 };
 /// Binding of the frame's uniform.

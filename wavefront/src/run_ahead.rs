@@ -8,7 +8,7 @@ use gpu_primitives::wgpu;
 use gpu_primitives::wgsl::Module;
 
 use crate::rays::{
-    FRAME_PARAMS, RAYS, READ, RayBuffers, Rays, SLOTS, WRITE, begin, resources, source,
+    FRAME_PARAMS, MASKS, RAYS, READ, RayBuffers, Rays, SLOTS, WRITE, begin, resources, source,
 };
 use crate::strategy::{MakeResident, Rounds, Scene, Strategy};
 
@@ -35,7 +35,7 @@ impl RunAhead {
 
     /// Text and bindings of the kernel.
     pub fn source(slot_pages: u32) -> KernelSource {
-        let mut bindings = vec![FRAME_PARAMS, RAYS, READ, READ, WRITE, WRITE];
+        let mut bindings = vec![FRAME_PARAMS, RAYS, READ, MASKS, WRITE, WRITE];
         bindings.extend(vec![SLOTS; slot_pages as usize]);
         source("wavefront.walk", WALK, bindings, slot_pages, &[], None)
     }

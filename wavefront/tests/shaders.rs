@@ -7,8 +7,8 @@ use wavefront::{Outputs, Rays, RunAhead};
 fn kind(binding: &Binding) -> BindingKind {
     match *binding {
         Binding::Uniform { bytes } => BindingKind::Uniform { bytes },
-        Binding::StorageRead { .. } => BindingKind::StorageRead { min_bytes: 0 },
-        Binding::StorageReadWrite { .. } => BindingKind::StorageReadWrite { min_bytes: 0 },
+        Binding::StorageRead { min_bytes } => BindingKind::StorageRead { min_bytes },
+        Binding::StorageReadWrite { min_bytes } => BindingKind::StorageReadWrite { min_bytes },
         Binding::TextureWrite { format } => BindingKind::TextureWrite { format },
         Binding::TextureSample { sample } => BindingKind::TextureSample { sample },
     }
