@@ -50,3 +50,21 @@ fn every_buffer_fits_a_binding() {
         assert_eq!(plan.slots(), blocks.min(MAX_PAGES * (bytes / SLOT_BYTES)));
     }
 }
+
+#[test]
+fn memory_beside_the_cache_counts_towards_the_bytes() {
+    let limits = Limits::default();
+    let beside = |slots: u64| 1000 + 12 * slots;
+    for bytes in [50_000, 1 << 20, 10_000_000] {
+        let plan = CachePlan::fit_beside(5000, bytes, &limits, beside).unwrap();
+        assert!(plan.bytes() + beside(plan.slots()) <= bytes);
+        let alone = CachePlan::fit(5000, bytes, &limits).unwrap();
+        assert!(plan.slots() < alone.slots() || plan.slots() == 5000);
+        let one_more = CachePlan::fit(5000, plan.bytes() + 400, &limits).unwrap();
+        let needed = one_more.bytes() + beside(one_more.slots());
+        assert!(plan.slots() == 5000 || (one_more.slots() > plan.slots() && needed > bytes));
+    }
+    let minimum = CachePlan::minimum_bytes(5000) + beside(8);
+    assert_eq!(CachePlan::fit_beside(5000, minimum, &limits, beside).unwrap().slots(), 8);
+    assert!(CachePlan::fit_beside(5000, minimum - 1, &limits, beside).is_err());
+}
