@@ -33,8 +33,6 @@ pub(crate) const RAYS: Binding = Binding::StorageReadWrite { min_bytes: 4 * RAYS
 pub(crate) const READ: Binding = Binding::StorageRead { min_bytes: 4 };
 /// Binding of the active masks, two words each.
 pub(crate) const MASKS: Binding = Binding::StorageRead { min_bytes: 8 };
-/// Binding of the active masks.
-pub(crate) const MASKS: Binding = Binding::StorageRead { min_bytes: 8 };
 /// Binding of anything that is written.
 pub(crate) const WRITE: Binding = Binding::StorageReadWrite { min_bytes: 4 };
 /// Binding of the frame's uniform.
