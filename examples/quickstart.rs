@@ -76,7 +76,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         camera,
         isovalues: vec![isovalue],
         options: FrameOptions {
-            shading: Shading { unfinished: [0.88, 0.91, 0.95, 1.0], ..Default::default() },
+            shading: Shading { unfinished: support::UNFINISHED, ..Default::default() },
             ..Default::default()
         },
     })?;

@@ -63,7 +63,7 @@ pub struct Arguments {
     /// Colour picture to write (PNG)
     #[arg(long, value_name = "F.png", value_parser = png)]
     pub color: Option<PathBuf>,
-    /// Distance along the view axis to write, in world units; +inf where no surface is known (OpenEXR)
+    /// Distance along the view axis to write, in world units; +inf where no surface is known (EXR)
     #[arg(long, value_name = "F.exr", value_parser = exr)]
     pub depth: Option<PathBuf>,
     /// Report to write: adapter, plan, one entry per pass (JSON)
@@ -156,11 +156,12 @@ pub struct CameraOptions {
 fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     let parts = text.split(',').map(|part| finite(part.trim())).collect::<Result<Vec<_>, _>>()?;
     let found = parts.len();
-    parts.try_into().map_err(|_| format!("expected {N} numbers with commas, found {found}"))
+    let expected = |_| format!("expected {N} numbers with commas, found {found}");
+    parts.try_into().map_err(expected)
 }
 
 fn finite(text: &str) -> Result<f64, String> {
-    let value: f64 = text.parse().map_err(|_| format!("\"{text}\" is not a number"))?;
+    let value: f64 = text.parse().map_err(|error| format!("\"{text}\" is not a number: {error}"))?;
     if value.is_finite() { Ok(value) } else { Err(format!("{text} is not finite")) }
 }
 
@@ -215,7 +216,7 @@ fn size(text: &str) -> Result<[u32; 2], String> {
     counts(text, 'x')
 }
 
-/// The size of a generated volume: AxBxC, or A for a cube.
+/// The size of a generated volume: `AxBxC`, or `A` for a cube.
 pub fn generator_size(text: &str) -> Option<[u32; 3]> {
     counts(text, 'x').or_else(|_| counts(text, 'x').map(|[n]| [n; 3])).ok()
 }

@@ -103,7 +103,8 @@ impl Input {
         let histogram = self.volume.histogram(BINS);
         let [low, high] = histogram.range();
         let isovalue = self.known_isovalue.unwrap_or_else(|| histogram.suggested_isovalue());
-        let mut text = format!("values        {low} to {high}\nisovalue      {isovalue} suggested\n");
+        let mut text =
+            format!("values        {low} to {high}\nisovalue      {isovalue} suggested\n");
         text += "\nhistogram (length: logarithm of the count)\n";
         let counts: Vec<u64> =
             histogram.counts().chunks(BINS / LINES).map(|bins| bins.iter().sum()).collect();
@@ -167,7 +168,8 @@ impl<'a> Generated<'a> {
                 let most = wgpu::Limits::default().max_storage_buffer_binding_size / 4;
                 let blocks: u128 = dims.map(|n| u128::from(n.div_ceil(4))).iter().product();
                 if blocks > u128::from(most) {
-                    let message = format!("{dims:?} voxels are {blocks} blocks, at most {most} fit");
+                    let message =
+                        format!("{dims:?} voxels are {blocks} blocks, at most {most} fit");
                     return Err(Problem::input(message));
                 }
                 let field = volumes::by_name(name, dims).map_err(Problem::input)?;

@@ -20,7 +20,7 @@ use input::Input;
 use problem::Problem;
 use progressive_iso::{
     Camera, Capture, CompressedVolume, Frame, FrameOptions, Outputs, ProgressiveIsoRenderer,
-    RendererOptions, wgpu,
+    RendererOptions, Shading, wgpu,
 };
 use support::{Gpu, PassEntry, Report};
 
@@ -87,7 +87,8 @@ fn render(arguments: &Arguments, volume: &str) -> Result<(), Problem> {
     let mut renderer = ProgressiveIsoRenderer::new(&gpu.device, &gpu.queue, volume, options)?;
     let setup_ms = begin.elapsed().as_secs_f64() * 1e3;
     let rounds_per_pass = arguments.rounds_per_pass;
-    let options = FrameOptions { rounds_per_pass, ..Default::default() };
+    let shading = Shading { unfinished: support::UNFINISHED, ..Default::default() };
+    let options = FrameOptions { rounds_per_pass, shading, ..Default::default() };
     renderer.set_frame(&Frame { camera, isovalues: vec![isovalue], options })?;
     let passes = run_passes(&gpu, &mut renderer, arguments.stop)?;
     if capture {

@@ -9,6 +9,9 @@ use serde::Serialize;
 
 pub type Failure = Box<dyn std::error::Error>;
 
+/// Colour of pixels that are not known yet: told apart from the background, but quiet.
+pub const UNFINISHED: [f32; 4] = [0.88, 0.91, 0.95, 1.0];
+
 /// Environment variable that names an adapter where no option does.
 pub const ADAPTER_VARIABLE: &str = "PROGRESSIVE_ISO_ADAPTER";
 
