@@ -112,6 +112,8 @@ fn writes_color_depth_and_report() {
         "-25,10.5",
         "--rounds-per-pass",
         "2",
+        "--look-ahead",
+        "3",
         "--color",
         &color,
         "--depth",

@@ -57,6 +57,11 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 1,
         value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub rounds_per_pass: u32,
+    /// Active blocks that a ray requests when it stops, the missing one included; more need fewer
+    /// passes and decode more
+    #[arg(long, value_name = "N", default_value_t = 1,
+        value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub look_ahead: u32,
     /// Stops at this finished share of the rays that enter the volume, 0 to 1
     #[arg(long, value_name = "SHARE", default_value_t = 1.0, value_parser = share)]
     pub stop: f64,
@@ -161,7 +166,8 @@ fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
 }
 
 fn finite(text: &str) -> Result<f64, String> {
-    let value: f64 = text.parse().map_err(|error| format!("\"{text}\" is not a number: {error}"))?;
+    let value: f64 =
+        text.parse().map_err(|error| format!("\"{text}\" is not a number: {error}"))?;
     if value.is_finite() { Ok(value) } else { Err(format!("{text} is not finite")) }
 }
 

@@ -64,7 +64,11 @@ impl Input {
         let rate = volume.rate();
         let mut text = format!("volume        {}\n", self.name);
         let mut line = |name: &str, value: String| text += &format!("{name:<13} {value}\n");
-        line("format", format!("{}, {} samples", source.format, source.sample_type));
+        let format = match source.format {
+            volume_io::Format::Memory => "generated".into(),
+            format => format.to_string(),
+        };
+        line("format", format!("{format}, {} samples", source.sample_type));
         line("dims", format!("{x} x {y} x {z} voxels in {} blocks", volume.block_count()));
         line(
             "stream",

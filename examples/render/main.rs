@@ -20,7 +20,7 @@ use input::Input;
 use problem::Problem;
 use progressive_iso::{
     Camera, Capture, CompressedVolume, Frame, FrameOptions, Outputs, ProgressiveIsoRenderer,
-    RendererOptions, Shading, wgpu,
+    RendererOptions, Shading, TraversalStrategy, wgpu,
 };
 use support::{Gpu, PassEntry, Report};
 
@@ -54,9 +54,9 @@ fn run(arguments: &Arguments) -> Result<(), Problem> {
         }
         return Ok(());
     }
-    match (&arguments.volume, arguments.strategy) {
-        (Some(volume), Strategy::RunAhead) => render(arguments, volume),
-        (None, _) => Err(Problem::input("no volume given").hint("see --help")),
+    match &arguments.volume {
+        Some(volume) => render(arguments, volume),
+        None => Err(Problem::input("no volume given").hint("see --help")),
     }
 }
 
@@ -81,14 +81,19 @@ fn render(arguments: &Arguments, volume: &str) -> Result<(), Problem> {
         budget_bytes: arguments.scene.budget << 20,
         outputs: Outputs { depth: arguments.depth.is_some(), ..Default::default() },
         capture,
+        strategy: match arguments.strategy {
+            Strategy::RunAhead => TraversalStrategy::RunAhead,
+        },
         ..Default::default()
     };
     let begin = Instant::now();
     let mut renderer = ProgressiveIsoRenderer::new(&gpu.device, &gpu.queue, volume, options)?;
     let setup_ms = begin.elapsed().as_secs_f64() * 1e3;
-    let rounds_per_pass = arguments.rounds_per_pass;
-    let shading = Shading { unfinished: support::UNFINISHED, ..Default::default() };
-    let options = FrameOptions { rounds_per_pass, shading, ..Default::default() };
+    let options = FrameOptions {
+        shading: Shading { unfinished: support::UNFINISHED, ..Default::default() },
+        rounds_per_pass: arguments.rounds_per_pass,
+        look_ahead: arguments.look_ahead,
+    };
     renderer.set_frame(&Frame { camera, isovalues: vec![isovalue], options })?;
     let passes = run_passes(&gpu, &mut renderer, arguments.stop)?;
     if capture {
