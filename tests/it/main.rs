@@ -1,0 +1,10 @@
+//! Tests of the whole library through its public API; one binary, so that wgpu is linked once.
+//!
+//! `docs/testing.md` says how to run them on other drivers.
+
+#![allow(clippy::unwrap_used, reason = "a failed set-up fails the test")]
+
+mod bounds;
+mod compare;
+mod reference;
+mod support;
