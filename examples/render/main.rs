@@ -197,10 +197,10 @@ fn run_passes(
         go_on
     })?;
     if let Some(last) = passes.last() {
-        let (count, peak) = (passes.len(), last.peak_bytes as f64 / 1e6);
+        let (count, peak) = (passes.len(), last.peak_bytes);
         let percent = last.completeness * 100.0;
         println!(
-            "\n{count} passes, {percent:.2}% complete, {} surface pixels, {peak:.1} MB at most",
+            "\n{count} passes, {percent:.2}% complete, {} surface pixels, {peak} bytes at most",
             last.hits
         );
         if last.hits == 0 && last.active_rays == 0 {
