@@ -2,29 +2,43 @@
 
 use zfp_rs::{ZfpScalar, ZfpScalarType};
 
-use crate::encode::{BlockEncoder, TOO_LARGE};
+use crate::encode::{Encoded, Encoder, TOO_LARGE};
 use crate::error::{Error, Result};
-use crate::formats::ReadOptions;
 use crate::grid::pad_block;
+use crate::options::ReadOptions;
+use crate::sink::Sink;
 use crate::source::{Format, SampleType};
-use crate::volume::ZfpVolume;
+
+/// Is told the number of blocks done and their total, after every layer of blocks.
+pub(crate) type Progress<'p> = &'p mut dyn FnMut(u64, u64);
 
 /// Checks, replaces, pads, encodes and measures the blocks of a file's samples.
-pub(crate) struct Converter {
-    encoder: BlockEncoder,
+pub(crate) struct Converter<'p, S> {
+    encoder: Encoder<S>,
     replacement: Option<f32>,
     replaced: u64,
+    progress: Option<Progress<'p>>,
 }
 
-impl Converter {
-    pub(crate) fn new(dims: [u32; 3], options: &ReadOptions) -> Result<Self> {
-        if let Some(value) = options.replace_non_finite
-            && (value.is_nan() || value.abs() >= TOO_LARGE)
-        {
-            return Err(Error::Replacement { value });
+/// Fails if the replacement for NaN and infinity is not usable itself.
+fn check_options(options: &ReadOptions) -> Result<()> {
+    match options.replace_non_finite {
+        Some(value) if value.is_nan() || value.abs() >= TOO_LARGE => {
+            Err(Error::Replacement { value })
         }
-        let encoder = BlockEncoder::new(dims, options.rate)?.measured();
-        Ok(Self { encoder, replacement: options.replace_non_finite, replaced: 0 })
+        _ => Ok(()),
+    }
+}
+
+impl<'p, S: Sink> Converter<'p, S> {
+    pub(crate) fn new(
+        mut encoder: Encoder<S>,
+        options: &ReadOptions,
+        progress: Option<Progress<'p>>,
+    ) -> Result<Self> {
+        check_options(options)?;
+        encoder.measure();
+        Ok(Self { encoder, replacement: options.replace_non_finite, replaced: 0, progress })
     }
 
     pub(crate) fn block_count(&self) -> u64 {
@@ -64,7 +78,14 @@ impl Converter {
             self.replaced += 1;
         }
         pad_block(&mut exact, valid);
-        self.encoder.push_exact(&exact.map(|value| value as f32), |i| exact[i])
+        self.encoder.push_exact(&exact.map(|value| value as f32), |i| exact[i])?;
+        let layer_ends = self.next_origin()[2] != origin[2];
+        if let Some(progress) = &mut self.progress
+            && layer_ends
+        {
+            progress(self.encoder.blocks_done(), self.encoder.block_count());
+        }
+        Ok(())
     }
 
     pub(crate) fn finish(
@@ -72,13 +93,13 @@ impl Converter {
         format: Format,
         sample_type: SampleType,
         rank: u32,
-    ) -> Result<ZfpVolume> {
-        let mut volume = self.encoder.finish()?;
-        volume.source.format = format;
-        volume.source.sample_type = sample_type;
-        volume.source.rank = rank;
-        volume.source.replaced = self.replaced;
-        Ok(volume)
+    ) -> Result<Encoded<S>> {
+        let mut encoded = self.encoder.finish()?;
+        encoded.source.format = format;
+        encoded.source.sample_type = sample_type;
+        encoded.source.rank = rank;
+        encoded.source.replaced = self.replaced;
+        Ok(encoded)
     }
 }
 

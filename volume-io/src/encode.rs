@@ -4,6 +4,7 @@ use zfp_rs::{ZfpBitStream, ZfpBitStreamRef, ZfpConfig, ZfpDimensionality};
 
 use crate::error::{Error, Result};
 use crate::grid::{Grid, bits_per_block, pad_block};
+use crate::sink::{Memory, Sink};
 use crate::source::{DistortionSum, Format, SampleType, Source};
 use crate::volume::{Geometry, ZfpVolume, fixed_rate};
 
@@ -15,19 +16,12 @@ const TINY: f32 = f32::from_bits((127 - 97) << 23);
 
 /// Encodes a volume whose blocks arrive one at a time, so that the decoded volume never has to
 /// exist as a whole. The stream is byte for byte that of libzfp's fixed-rate mode.
+///
+/// The memory of the whole stream is allocated with the first block, and becomes the volume's
+/// without a copy. [`StreamEncoder`](crate::StreamEncoder) writes the stream away instead.
 #[derive(Debug)]
 pub struct BlockEncoder {
-    grid: Grid,
-    bits_per_block: u32,
-    config: ZfpConfig,
-    next: u64,
-    /// Holds the bits of an incomplete last word, then one block.
-    scratch: ZfpBitStream,
-    carry: u64,
-    carry_bits: u32,
-    bytes: Vec<u8>,
-    tiny_blocks: u64,
-    distortion: Option<DistortionSum>,
+    inner: Encoder<Memory>,
 }
 
 impl BlockEncoder {
@@ -36,8 +30,103 @@ impl BlockEncoder {
     /// # Errors
     /// [`Error::Dims`] or [`Error::Rate`].
     pub fn new(dims: [u32; 3], rate: f64) -> Result<Self> {
+        Ok(Self { inner: Encoder::in_memory(dims, rate, true)? })
+    }
+
+    /// Measures the error introduced, at the price of decoding every block again.
+    #[must_use]
+    pub fn measured(mut self) -> Self {
+        self.inner.measure();
+        self
+    }
+
+    /// Number of blocks of the volume.
+    #[must_use]
+    pub fn block_count(&self) -> u64 {
+        self.inner.block_count()
+    }
+
+    /// First voxel of the block that [`BlockEncoder::push`] expects next.
+    #[must_use]
+    pub fn next_origin(&self) -> [u32; 3] {
+        self.inner.next_origin()
+    }
+
+    /// Number of its voxels inside the volume along each axis.
+    #[must_use]
+    pub fn next_valid(&self) -> [u32; 3] {
+        self.inner.next_valid()
+    }
+
+    /// Adds the next block, x-fastest. Sample (x, y, z) is at x + 4y + 16z; samples outside the
+    /// volume are the caller's choice and cost least after [`pad_block`].
+    ///
+    /// # Errors
+    /// [`Error::NonFinite`], [`Error::TooLarge`], [`Error::BlockCount`] after the last block, or
+    /// [`Error::OutOfMemory`]. The encoder is unchanged then.
+    pub fn push(&mut self, samples: &[f32; 64]) -> Result<()> {
+        self.inner.push(samples)
+    }
+
+    /// The volume, once all its blocks were added.
+    ///
+    /// # Errors
+    /// [`Error::BlockCount`] if blocks are missing.
+    pub fn finish(self) -> Result<ZfpVolume> {
+        self.inner.finish()?.into_volume()
+    }
+}
+
+/// Turns blocks into the words of a stream, which go to `sink`.
+#[derive(Debug)]
+pub(crate) struct Encoder<S> {
+    grid: Grid,
+    bits_per_block: u32,
+    config: ZfpConfig,
+    next: u64,
+    /// Holds the bits of an incomplete last word, then one block.
+    scratch: ZfpBitStream,
+    carry: u64,
+    carry_bits: u32,
+    sink: S,
+    tiny_blocks: u64,
+    distortion: Option<DistortionSum>,
+}
+
+/// What an encoder leaves behind.
+pub(crate) struct Encoded<S> {
+    pub(crate) dims: [u32; 3],
+    pub(crate) bits_per_block: u32,
+    pub(crate) source: Source,
+    pub(crate) geometry: Geometry,
+    pub(crate) sink: S,
+}
+
+impl Encoded<Memory> {
+    pub(crate) fn into_volume(self) -> Result<ZfpVolume> {
+        Ok(ZfpVolume {
+            dims: self.dims,
+            bits_per_block: self.bits_per_block,
+            first_bit: 0,
+            bytes: self.sink.into_bytes()?,
+            geometry: self.geometry,
+            source: self.source,
+        })
+    }
+}
+
+impl Encoder<Memory> {
+    /// `whole`: the stream will be complete, so its memory can be allocated at once.
+    pub(crate) fn in_memory(dims: [u32; 3], rate: f64, whole: bool) -> Result<Self> {
         let grid = Grid::new(dims)?;
         let bits_per_block = bits_per_block(rate)?;
+        let total = grid.stream_bytes(bits_per_block, 0).next_multiple_of(8);
+        Self::new(grid, bits_per_block, Memory::new(total, whole))
+    }
+}
+
+impl<S: Sink> Encoder<S> {
+    pub(crate) fn new(grid: Grid, bits_per_block: u32, sink: S) -> Result<Self> {
         let scratch_bytes = bits_per_block.div_ceil(8) + 24;
         let scratch = ZfpBitStream::new(scratch_bytes as usize)
             .map_err(|error| Error::OutOfMemory { bytes: error.bytes as u64 })?;
@@ -49,48 +138,56 @@ impl BlockEncoder {
             scratch,
             carry: 0,
             carry_bits: 0,
-            bytes: Vec::new(),
+            sink,
             tiny_blocks: 0,
             distortion: None,
         })
     }
 
-    /// Measures the error introduced, at the price of decoding every block again.
-    #[must_use]
-    pub fn measured(mut self) -> Self {
-        self.distortion = Some(DistortionSum::new());
-        self
+    /// As [`Encoder::new`]; the first `bits` bits of the stream are those of `header`.
+    pub(crate) fn behind_header(
+        grid: Grid,
+        bits_per_block: u32,
+        sink: S,
+        header: &[u64],
+        bits: u32,
+    ) -> Result<Self> {
+        let mut encoder = Self::new(grid, bits_per_block, sink)?;
+        encoder.carry_bits = bits % 64;
+        let complete = (bits / 64) as usize;
+        encoder.carry = header.get(complete).copied().unwrap_or(0);
+        for word in header.iter().take(complete) {
+            encoder.sink.write(word.to_le_bytes())?;
+        }
+        Ok(encoder)
     }
 
-    /// Number of blocks of the volume.
-    #[must_use]
-    pub fn block_count(&self) -> u64 {
+    pub(crate) fn measure(&mut self) {
+        self.distortion = Some(DistortionSum::new());
+    }
+
+    pub(crate) fn block_count(&self) -> u64 {
         self.grid.block_count()
     }
 
-    /// First voxel of the block that [`BlockEncoder::push`] expects next.
-    #[must_use]
-    pub fn next_origin(&self) -> [u32; 3] {
+    /// Number of blocks that were added.
+    pub(crate) fn blocks_done(&self) -> u64 {
+        self.next
+    }
+
+    pub(crate) fn next_origin(&self) -> [u32; 3] {
         self.grid.origin(self.next)
     }
 
-    /// Number of its voxels inside the volume along each axis.
-    #[must_use]
-    pub fn next_valid(&self) -> [u32; 3] {
+    pub(crate) fn next_valid(&self) -> [u32; 3] {
         self.grid.valid(self.next_origin())
     }
 
-    /// Adds the next block, x-fastest. Sample (x, y, z) is at x + 4y + 16z; samples outside the
-    /// volume are the caller's choice and cost least after [`pad_block`].
-    ///
-    /// # Errors
-    /// [`Error::NonFinite`], [`Error::TooLarge`], [`Error::BlockCount`] after the last block, or
-    /// [`Error::OutOfMemory`]. The encoder is unchanged then.
-    pub fn push(&mut self, samples: &[f32; 64]) -> Result<()> {
+    pub(crate) fn push(&mut self, samples: &[f32; 64]) -> Result<()> {
         self.push_exact(samples, |i| f64::from(samples[i]))
     }
 
-    /// As [`BlockEncoder::push`], for samples that are `exact(i)` before rounding.
+    /// As [`Encoder::push`], for samples that are `exact(i)` before rounding.
     pub(crate) fn push_exact(
         &mut self,
         samples: &[f32; 64],
@@ -101,38 +198,33 @@ impl BlockEncoder {
             return Err(Error::BlockCount { expected, found: expected + 1 });
         }
         let largest = self.check(samples)?;
-        self.reserve()?;
+        self.sink.reserve(u64::from(self.bits_per_block) / 8 + 16)?;
         self.encode(samples)?;
-        self.measure(exact)?;
-        self.take_words();
+        self.compare(exact)?;
+        self.take_words()?;
         self.tiny_blocks += u64::from(largest > 0.0 && largest < TINY);
         self.next += 1;
         Ok(())
     }
 
-    /// The volume, once all its blocks were added.
-    ///
-    /// # Errors
-    /// [`Error::BlockCount`] if blocks are missing.
-    pub fn finish(mut self) -> Result<ZfpVolume> {
+    pub(crate) fn finish(mut self) -> Result<Encoded<S>> {
         let expected = self.block_count();
         if self.next != expected {
             return Err(Error::BlockCount { expected, found: self.next });
         }
         if self.carry_bits > 0 {
-            self.bytes.extend_from_slice(&self.carry.to_le_bytes());
+            self.sink.write(self.carry.to_le_bytes())?;
         }
         let mut source = Source::new(Format::Memory, SampleType::F32);
         source.encoded = true;
         source.tiny_blocks = self.tiny_blocks;
         source.distortion = self.distortion.map(|sum| sum.distortion());
-        Ok(ZfpVolume {
+        Ok(Encoded {
             dims: self.grid.dims,
             bits_per_block: self.bits_per_block,
-            first_bit: 0,
-            bytes: self.bytes.into(),
-            geometry: Geometry::default(),
             source,
+            geometry: Geometry::default(),
+            sink: self.sink,
         })
     }
 
@@ -153,13 +245,6 @@ impl BlockEncoder {
         Ok(largest)
     }
 
-    fn reserve(&mut self) -> Result<()> {
-        let more = self.bits_per_block as usize / 8 + 24;
-        self.bytes
-            .try_reserve(more)
-            .map_err(|_error| Error::OutOfMemory { bytes: self.bytes.len() as u64 * 2 })
-    }
-
     fn encode(&mut self, samples: &[f32; 64]) -> Result<()> {
         self.scratch.rewind();
         self.scratch.write_bits(self.carry, self.carry_bits);
@@ -174,7 +259,8 @@ impl BlockEncoder {
         Ok(())
     }
 
-    fn measure(&mut self, exact: impl Fn(usize) -> f64) -> Result<()> {
+    /// Adds the differences between the block just encoded and its exact samples.
+    fn compare(&mut self, exact: impl Fn(usize) -> f64) -> Result<()> {
         let [nx, ny, nz] = self.next_valid().map(|n| n as usize);
         let Some(sum) = &mut self.distortion else { return Ok(()) };
         let mut decoded = [0.0f32; 64];
@@ -198,15 +284,16 @@ impl BlockEncoder {
     }
 
     /// Moves the complete words of the scratch stream to the output.
-    fn take_words(&mut self) {
+    fn take_words(&mut self) -> Result<()> {
         let bits = self.carry_bits + self.bits_per_block;
         let complete = (bits / 64) as usize;
         let words = self.scratch.as_words();
         for word in words.iter().take(complete) {
-            self.bytes.extend_from_slice(&word.to_le_bytes());
+            self.sink.write(word.to_le_bytes())?;
         }
         self.carry_bits = bits % 64;
         self.carry = words.get(complete).copied().unwrap_or(0);
+        Ok(())
     }
 }
 
@@ -218,7 +305,7 @@ impl BlockEncoder {
 /// [`Error::TooLarge`].
 pub fn encode(samples: &[f32], dims: [u32; 3], rate: f64) -> Result<ZfpVolume> {
     let mut encoder = BlockEncoder::new(dims, rate)?;
-    let expected = encoder.grid.voxel_count();
+    let expected = encoder.inner.grid.voxel_count();
     if samples.len() as u64 != expected {
         return Err(Error::SampleCount { expected, found: samples.len() as u64 });
     }
@@ -232,7 +319,7 @@ pub fn encode(samples: &[f32], dims: [u32; 3], rate: f64) -> Result<ZfpVolume> {
 }
 
 /// The samples of a block, which lies inside `samples`; those outside the volume are zero.
-pub(crate) fn gather<T: Copy + Default>(
+fn gather<T: Copy + Default>(
     samples: &[T],
     dims: [u32; 3],
     origin: [u32; 3],

@@ -1,6 +1,6 @@
 //! What can be wrong with a volume or a file, said as what was expected and what was found.
 
-use crate::source::Format;
+use crate::source::{Format, SampleType};
 
 /// Result of this crate's fallible functions.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -20,7 +20,8 @@ pub enum Error {
     /// Neither the first bytes nor the name say what kind of file this is.
     #[error(
         "{name}: unknown kind of file (first bytes {start:02x?}); expected zfp with its header, \
-         NIfTI, or headerless zfp with dims and rate given"
+         NIfTI, NumPy, NRRD, VTK ImageData or MRC, a raw file named NAME_XxYxZ_TYPE.raw, or dims \
+         and rate or type given"
     )]
     UnknownFormat {
         /// Name of the file.
@@ -33,6 +34,26 @@ pub enum Error {
     HeaderlessNeedsLayout {
         /// Name of the file.
         name: String,
+    },
+    /// A file whose name ends in `.raw` does not say what it holds, and nothing else was given.
+    #[error(
+        "{name}: expected a name like NAME_XxYxZ_TYPE.raw with TYPE one of uint8, int8, uint16, \
+         int16, uint32, int32, uint64, int64, float16, float32, float64; or dims and type given"
+    )]
+    RawNeedsLayout {
+        /// Name of the file.
+        name: String,
+    },
+    /// The data are in a second file, which cannot or must not be opened.
+    #[error(
+        "{name}: the data are in a second file {file:?}; expected a file beside or below the \
+         header, read with `read_file` or `convert_file`"
+    )]
+    SecondFile {
+        /// Name of the file.
+        name: String,
+        /// The other file, as the header names it.
+        file: String,
     },
     /// The file needs a reader that was left out of this build.
     #[error("{name}: this build cannot read it; enable the cargo feature `{feature}` of volume-io")]
@@ -121,6 +142,29 @@ pub enum Error {
         /// Bytes there are.
         found: u64,
     },
+    /// The length of a raw file contradicts its dims and type.
+    #[error(
+        "raw file: {dims:?} voxels of type {sample_type} take {expected} bytes, found {found}; \
+         dims or type may be wrong"
+    )]
+    RawLength {
+        /// Voxels along each axis, as given or named.
+        dims: [u32; 3],
+        /// Type of the samples, as given or named.
+        sample_type: SampleType,
+        /// Bytes that these take.
+        expected: u64,
+        /// Bytes there are.
+        found: u64,
+    },
+    /// The array asked for is not in the file.
+    #[error("array {wanted:?}: expected one of {found:?}")]
+    NoSuchArray {
+        /// The name asked for.
+        wanted: String,
+        /// The names there are.
+        found: Vec<String>,
+    },
     /// A NaN or an infinity, which ZFP cannot hold.
     #[error(
         "voxel {voxel:?} is {value}: expected finite values (give a replacement to read it anyway)"
@@ -193,4 +237,16 @@ pub enum Error {
         /// What it said.
         reason: String,
     },
+}
+
+impl Error {
+    /// A header field without a value that the format allows.
+    pub(crate) fn header(
+        format: Format,
+        field: &'static str,
+        expected: impl Into<String>,
+        found: impl std::fmt::Display,
+    ) -> Self {
+        Self::InvalidHeader { format, field, expected: expected.into(), found: found.to_string() }
+    }
 }

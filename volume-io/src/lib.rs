@@ -23,16 +23,25 @@ mod encode;
 mod error;
 mod formats;
 mod grid;
+mod input;
+mod layout;
+mod options;
+mod sink;
 mod source;
 mod stats;
+mod stream;
 mod volume;
+mod write;
 
 pub use encode::{BlockEncoder, encode};
 pub use error::{Error, Result};
 #[cfg(not(all(target_arch = "wasm32", target_os = "unknown")))]
-pub use formats::read_file;
-pub use formats::{Headerless, ReadOptions, read_bytes, write_zfp};
+pub use formats::{convert_file, read_file};
+pub use formats::{read_bytes, write_zfp};
 pub use grid::{MAX_DIM, bits_per_block, pad_block};
+pub use options::{Headerless, RawLayout, ReadOptions};
 pub use source::{Distortion, Format, Note, SampleType, Source};
 pub use stats::{Histogram, value_range};
+pub use stream::{Conversion, StreamEncoder};
 pub use volume::{Block, Geometry, MAX_EXPONENT, TINY_EXPONENT, ZfpVolume};
+pub use write::{raw_file_name, write_npy, write_nrrd, write_raw};

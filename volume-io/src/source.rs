@@ -14,6 +14,16 @@ pub enum Format {
     ZfpHeaderless,
     /// NIfTI-1.
     Nifti,
+    /// Samples without a header (`.raw`).
+    Raw,
+    /// NumPy's `.npy`.
+    Npy,
+    /// NRRD, attached or detached.
+    Nrrd,
+    /// `ImageData` of VTK in XML (`.vti`).
+    Vti,
+    /// MRC2014 or CCP4.
+    Mrc,
 }
 
 impl fmt::Display for Format {
@@ -23,6 +33,11 @@ impl fmt::Display for Format {
             Self::Zfp => "zfp",
             Self::ZfpHeaderless => "headerless zfp",
             Self::Nifti => "NIfTI",
+            Self::Raw => "raw",
+            Self::Npy => "NumPy",
+            Self::Nrrd => "NRRD",
+            Self::Vti => "VTK ImageData",
+            Self::Mrc => "MRC",
         })
     }
 }
@@ -47,6 +62,8 @@ pub enum SampleType {
     U64,
     /// Signed 64-bit integer.
     I64,
+    /// 16-bit float.
+    F16,
     /// 32-bit float.
     F32,
     /// 64-bit float.
@@ -54,12 +71,51 @@ pub enum SampleType {
 }
 
 impl SampleType {
+    /// Every type.
+    pub const ALL: &'static [Self] = &[
+        Self::U8,
+        Self::I8,
+        Self::U16,
+        Self::I16,
+        Self::U32,
+        Self::I32,
+        Self::U64,
+        Self::I64,
+        Self::F16,
+        Self::F32,
+        Self::F64,
+    ];
+
+    /// The name that raw files carry, such as `uint8` or `float32`.
+    #[must_use]
+    pub fn raw_name(self) -> &'static str {
+        match self {
+            Self::U8 => "uint8",
+            Self::I8 => "int8",
+            Self::U16 => "uint16",
+            Self::I16 => "int16",
+            Self::U32 => "uint32",
+            Self::I32 => "int32",
+            Self::U64 => "uint64",
+            Self::I64 => "int64",
+            Self::F16 => "float16",
+            Self::F32 => "float32",
+            Self::F64 => "float64",
+        }
+    }
+
+    /// The type of this name, as raw files carry it; the case does not matter.
+    #[must_use]
+    pub fn from_raw_name(name: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|ty| ty.raw_name().eq_ignore_ascii_case(name))
+    }
+
     /// Bytes of one sample.
     #[must_use]
     pub fn bytes(self) -> u32 {
         match self {
             Self::U8 | Self::I8 => 1,
-            Self::U16 | Self::I16 => 2,
+            Self::U16 | Self::I16 | Self::F16 => 2,
             Self::U32 | Self::I32 | Self::F32 => 4,
             Self::U64 | Self::I64 | Self::F64 => 8,
         }
@@ -77,6 +133,7 @@ impl fmt::Display for SampleType {
             Self::I32 => "i32",
             Self::U64 => "u64",
             Self::I64 => "i64",
+            Self::F16 => "f16",
             Self::F32 => "f32",
             Self::F64 => "f64",
         })
@@ -114,6 +171,13 @@ pub enum Note {
         /// Of how many.
         count: u64,
     },
+    /// The array that was read, of a file whose arrays have names.
+    Array {
+        /// Its name.
+        name: String,
+    },
+    /// The file holds values of cells and none of points; the cells became voxels.
+    CellData,
 }
 
 impl fmt::Display for Note {
@@ -128,6 +192,8 @@ impl fmt::Display for Note {
             ),
             Self::SpacingIgnored => f.write_str("an invalid spacing was taken as 1"),
             Self::VolumeChosen { index, count } => write!(f, "volume {index} of {count}"),
+            Self::Array { name } => write!(f, "array {name:?} was read"),
+            Self::CellData => f.write_str("values of cells were taken as voxels at their centres"),
         }
     }
 }

@@ -41,6 +41,7 @@ fn options() -> impl Strategy<Value = ReadOptions> {
                 rate: if rate.abs() > 100.0 { 2.0 } else { rate },
             }),
             time_index: index,
+            ..ReadOptions::default()
         }
     })
 }

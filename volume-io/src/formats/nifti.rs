@@ -1,213 +1,89 @@
-//! NIfTI-1 in one file (`.nii`), read in slabs of one layer of blocks.
+//! NIfTI-1, in one file (`.nii`) or as a pair (`.hdr` and `.img`).
 //!
-//! The crate `nifti` parses the header. The samples are read here, because it would allocate what
-//! the header claims and read the whole volume at once.
-
-use std::io::{self, Read};
+//! The crate `nifti` parses the header. It does not read the samples, because it would allocate
+//! what the header claims and read the whole volume at once.
 
 use nifti::{Endianness, NiftiError, NiftiHeader, NiftiType};
 
-use crate::convert::Converter;
-use crate::encode::gather;
 use crate::error::{Error, Result};
-use crate::formats::ReadOptions;
-use crate::source::{Format, Note, SampleType};
-use crate::volume::{Geometry, ZfpVolume};
+use crate::input::Input;
+use crate::layout::{Layout, choose};
+use crate::options::ReadOptions;
+use crate::source::{Format, SampleType};
 
 /// Length of the header with the four bytes that announce extensions.
-pub(super) const HEADER_BYTES: u64 = 352;
+const HEADER_BYTES: u64 = 352;
+
+/// Length of the header without them: files of a pair may end there.
+const PAIR_HEADER_BYTES: u64 = 348;
 
 /// Relative size up to which the off-diagonal elements of an affine matrix count as zero.
 const ALIGNED: f64 = 1e-5;
 
-/// Reads a volume from `reader`, whose length is `length` where that is known.
-pub(super) fn read(
-    name: &str,
-    mut reader: impl Read,
-    length: Option<u64>,
-    options: &ReadOptions,
-) -> Result<ZfpVolume> {
-    let layout = Layout::read(name, &mut reader, options)?;
-    if let Some(found) = length
-        && found < layout.end
-    {
-        return Err(Error::TooShort { expected: layout.end, found });
+/// Reads the header, and finds the file with the data.
+pub(super) fn open<'a>(mut input: Input<'a>, options: &ReadOptions) -> Result<(Layout, Input<'a>)> {
+    let bytes = input.take_bytes(PAIR_HEADER_BYTES)?;
+    let header = NiftiHeader::from_reader(bytes.as_slice()).map_err(header_error)?;
+    if &header.magic == nifti::header::MAGIC_CODE_NIP1 {
+        input.skip_to(HEADER_BYTES)?;
+        return Ok((layout(&header, HEADER_BYTES, options)?, input));
     }
-    let mut converter = Converter::new(layout.dims, options)?;
-    let mut slabs = Slabs { name, reader, layout: &layout, position: HEADER_BYTES };
-    slabs.skip_to(layout.start)?;
-    for z in (0..layout.dims[2]).step_by(4) {
-        let depth = (layout.dims[2] - z).min(4);
-        let slab = slabs.next(depth)?;
-        push_slab(&mut converter, &slab, [layout.dims[0], layout.dims[1], depth])?;
+    if input.folder.is_none() {
+        return Err(Error::Unsupported {
+            format: Format::Nifti,
+            expected: "header and data in one file (.nii), or a pair read from the file system",
+            found: "a header whose data are in a second file (.hdr and .img)".into(),
+        });
     }
-    let mut volume = converter.finish(Format::Nifti, layout.sample_type, layout.rank)?;
-    volume.geometry = layout.geometry;
-    volume.source.notes = layout.notes.clone();
-    let trailing = length.unwrap_or(0).saturating_sub(layout.file_end);
-    if trailing > 0 {
-        volume.source.notes.push(Note::TrailingBytes(trailing));
-    }
-    Ok(volume)
+    let layout = layout(&header, 0, options)?;
+    Ok((layout, image(&input)?))
 }
 
-/// Adds the blocks of one layer.
-fn push_slab(converter: &mut Converter, slab: &[f64], dims: [u32; 3]) -> Result<()> {
-    let layer = u64::from(dims[0].div_ceil(4)) * u64::from(dims[1].div_ceil(4));
-    for _ in 0..layer {
-        let [x, y, _] = converter.next_origin();
-        converter.push(gather(slab, dims, [x, y, 0], converter.next_valid()))?;
-    }
-    Ok(())
-}
-
-/// What the header says about the volume to read.
-struct Layout {
-    dims: [u32; 3],
-    rank: u32,
-    sample_type: SampleType,
-    big_endian: bool,
-    slope: f64,
-    inter: f64,
-    geometry: Geometry,
-    notes: Vec<Note>,
-    /// Bytes of the file before the volume, up to its end, and up to the end of all volumes.
-    start: u64,
-    end: u64,
-    file_end: u64,
-}
-
-impl Layout {
-    fn read(name: &str, reader: &mut impl Read, options: &ReadOptions) -> Result<Self> {
-        let mut bytes = Vec::new();
-        let access = |source| Error::Io { name: name.into(), source };
-        reader.take(HEADER_BYTES).read_to_end(&mut bytes).map_err(access)?;
-        if (bytes.len() as u64) < HEADER_BYTES {
-            return Err(Error::TooShort { expected: HEADER_BYTES, found: bytes.len() as u64 });
+/// The file with the data of a pair, compressed or not.
+fn image<'a>(header: &Input<'_>) -> Result<Input<'a>> {
+    let name = &header.file_name;
+    let stem = name.len().saturating_sub(4);
+    let ending = match name.get(stem..) {
+        Some(".HDR") => "IMG",
+        Some(ending) if ending.eq_ignore_ascii_case(".hdr") => "img",
+        _ => {
+            let file = format!("{name}.img");
+            return Err(Error::SecondFile { name: header.name.clone(), file });
         }
-        let header = NiftiHeader::from_reader(bytes.as_slice()).map_err(header_error)?;
-        if &header.magic != nifti::header::MAGIC_CODE_NIP1 {
-            return Err(Error::Unsupported {
-                format: Format::Nifti,
-                expected: "header and data in one file (.nii)",
-                found: "a header whose data are in a second file (.hdr and .img)".into(),
-            });
+    };
+    let plain = format!("{}.{ending}", name.get(..stem).unwrap_or_default());
+    match header.open_other(&plain) {
+        Err(Error::Io { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => {
+            // Names the plain file where neither exists.
+            let zipped = header.open_other(&format!("{plain}.gz"));
+            super::gunzip(zipped.or_else(|_| header.open_other(&plain))?)
         }
-        Self::new(&header, options)
-    }
-
-    fn new(header: &NiftiHeader, options: &ReadOptions) -> Result<Self> {
-        check(header.sizeof_hdr == 348, "sizeof_hdr", "348", &header.sizeof_hdr)?;
-        let (dims, rank, count) = shape(header)?;
-        let sample_type = sample_type(header)?;
-        let (geometry, mut notes) = geometry(header);
-        let index = choose(count, options, &mut notes)?;
-        let volume = dims
-            .iter()
-            .fold(u64::from(sample_type.bytes()), |bytes, &n| bytes.saturating_mul(u64::from(n)));
-        let first = data_start(header)?;
-        let start = first.saturating_add(volume.saturating_mul(index));
-        let scaled =
-            header.scl_slope != 0.0 && header.scl_slope.is_finite() && header.scl_inter.is_finite();
-        let scale = [f64::from(header.scl_slope), f64::from(header.scl_inter)];
-        let [slope, inter] = if scaled { scale } else { [1.0, 0.0] };
-        Ok(Self {
-            dims,
-            rank,
-            sample_type,
-            big_endian: header.endianness == Endianness::Big,
-            slope,
-            inter,
-            geometry,
-            notes,
-            start,
-            end: start.saturating_add(volume),
-            file_end: first.saturating_add(volume.saturating_mul(count)),
-        })
-    }
-
-    /// The samples of the file's type, scaled.
-    fn convert(&self, bytes: &[u8]) -> Vec<f64> {
-        let big = self.big_endian;
-        let raw: Vec<f64> = match self.sample_type {
-            SampleType::U8 => values(bytes, big, |b: [u8; 1]| f64::from(b[0])),
-            SampleType::I8 => values(bytes, big, |b| f64::from(i8::from_le_bytes(b))),
-            SampleType::U16 => values(bytes, big, |b| f64::from(u16::from_le_bytes(b))),
-            SampleType::I16 => values(bytes, big, |b| f64::from(i16::from_le_bytes(b))),
-            SampleType::U32 => values(bytes, big, |b| f64::from(u32::from_le_bytes(b))),
-            SampleType::I32 => values(bytes, big, |b| f64::from(i32::from_le_bytes(b))),
-            SampleType::U64 => values(bytes, big, |b| u64::from_le_bytes(b) as f64),
-            SampleType::I64 => values(bytes, big, |b| i64::from_le_bytes(b) as f64),
-            SampleType::F32 => values(bytes, big, |b| f64::from(f32::from_le_bytes(b))),
-            SampleType::F64 => values(bytes, big, f64::from_le_bytes),
-        };
-        if self.slope == 1.0 && self.inter == 0.0 {
-            return raw;
-        }
-        raw.into_iter().map(|value| value * self.slope + self.inter).collect()
+        other => other,
     }
 }
 
-/// Splits `bytes` into samples of N bytes and converts each from little-endian order.
-fn values<const N: usize>(bytes: &[u8], big: bool, value: impl Fn([u8; N]) -> f64) -> Vec<f64> {
-    let (samples, _) = bytes.as_chunks::<N>();
-    let ordered = samples.iter().map(|&sample| {
-        let mut sample = sample;
-        if big {
-            sample.reverse();
-        }
-        sample
-    });
-    ordered.map(value).collect()
-}
-
-/// The data of a volume, a layer of blocks at a time.
-struct Slabs<'a, R> {
-    name: &'a str,
-    reader: R,
-    layout: &'a Layout,
-    position: u64,
-}
-
-impl<R: Read> Slabs<'_, R> {
-    fn skip_to(&mut self, position: u64) -> Result<()> {
-        let wanted = position.saturating_sub(self.position);
-        let skipped = io::copy(&mut self.reader.by_ref().take(wanted), &mut io::sink())
-            .map_err(|source| Error::Io { name: self.name.into(), source })?;
-        self.advance(skipped, wanted)
+/// What the header says; `least` bytes come before the data.
+fn layout(header: &NiftiHeader, least: u64, options: &ReadOptions) -> Result<Layout> {
+    check(header.sizeof_hdr == 348, "sizeof_hdr", "348", &header.sizeof_hdr)?;
+    let (dims, rank, count) = shape(header)?;
+    let sample_type = sample_type(header)?;
+    let first = data_start(header, least)?;
+    let mut notes = Vec::new();
+    let index = choose(count, options.time_index, &mut notes)?;
+    let mut layout = Layout::new(Format::Nifti, dims, sample_type, first, [index, count]);
+    layout.rank = rank;
+    layout.big_endian = header.endianness == Endianness::Big;
+    let [slope, inter] = [f64::from(header.scl_slope), f64::from(header.scl_inter)];
+    if slope != 0.0 && slope.is_finite() && inter.is_finite() {
+        layout.scale = [slope, inter];
     }
-
-    /// The next `depth` slices. Memory grows with the data that arrive.
-    fn next(&mut self, depth: u32) -> Result<Vec<f64>> {
-        let [nx, ny, _] = self.layout.dims.map(u64::from);
-        let wanted = nx * ny * u64::from(depth) * u64::from(self.layout.sample_type.bytes());
-        let mut bytes = Vec::new();
-        let found = self
-            .reader
-            .by_ref()
-            .take(wanted)
-            .read_to_end(&mut bytes)
-            .map_err(|source| Error::Io { name: self.name.into(), source })?;
-        self.advance(found as u64, wanted)?;
-        Ok(self.layout.convert(&bytes))
-    }
-
-    fn advance(&mut self, found: u64, wanted: u64) -> Result<()> {
-        self.position += found;
-        if found < wanted {
-            return Err(Error::TooShort { expected: self.layout.end, found: self.position });
-        }
-        Ok(())
-    }
+    place(&mut layout, header);
+    layout.notes.extend(notes);
+    Ok(layout)
 }
 
 fn header_error(error: NiftiError) -> Error {
-    Error::InvalidHeader {
-        format: Format::Nifti,
-        field: "header",
-        expected: "a NIfTI-1 header".into(),
-        found: error.to_string(),
-    }
+    Error::header(Format::Nifti, "header", "a NIfTI-1 header", error)
 }
 
 fn check(
@@ -219,12 +95,7 @@ fn check(
     if valid {
         return Ok(());
     }
-    Err(Error::InvalidHeader {
-        format: Format::Nifti,
-        field,
-        expected: expected.into(),
-        found: found.to_string(),
-    })
+    Err(Error::header(Format::Nifti, field, expected, found))
 }
 
 /// Voxels along three axes, number of spatial axes, and number of volumes.
@@ -268,48 +139,22 @@ fn sample_type(header: &NiftiHeader) -> Result<SampleType> {
     })
 }
 
-/// Index of the volume to read, out of `count`.
-fn choose(count: u64, options: &ReadOptions, notes: &mut Vec<Note>) -> Result<u64> {
-    match options.time_index {
-        None if count > 1 => Err(Error::SeveralVolumes { count }),
-        None => Ok(0),
-        Some(index) if u64::from(index) >= count => Err(Error::TimeIndex { index, count }),
-        Some(index) => {
-            if count > 1 {
-                notes.push(Note::VolumeChosen { index, count });
-            }
-            Ok(u64::from(index))
-        }
-    }
-}
-
 /// Where the data begin: not inside the header; some writers leave 0 for "right behind it".
-fn data_start(header: &NiftiHeader) -> Result<u64> {
+fn data_start(header: &NiftiHeader, least: u64) -> Result<u64> {
     let offset = f64::from(header.vox_offset);
-    let valid = offset == 0.0 || (offset >= HEADER_BYTES as f64 && offset < (1u64 << 53) as f64);
-    check(valid, "vox_offset", "352 or more bytes", &offset)?;
-    Ok((offset as u64).max(HEADER_BYTES))
+    let valid = offset == 0.0 || (offset >= least as f64 && offset < (1u64 << 53) as f64);
+    check(valid, "vox_offset", &format!("{least} or more bytes"), &offset)?;
+    Ok((offset as u64).max(least))
 }
 
 /// Spacing, and the origin where spacing and origin say all.
-fn geometry(header: &NiftiHeader) -> (Geometry, Vec<Note>) {
-    let mut notes = Vec::new();
-    let mut geometry = Geometry::default();
-    for (spacing, &found) in geometry.spacing.iter_mut().zip(header.pixdim.iter().skip(1)) {
-        if found.is_finite() && found != 0.0 {
-            *spacing = f64::from(found.abs());
-        } else if !notes.contains(&Note::SpacingIgnored) {
-            notes.push(Note::SpacingIgnored);
-        }
-    }
-    match affine(header) {
-        Some((matrix, origin)) if is_aligned(&matrix) && origin.iter().all(|v| v.is_finite()) => {
-            geometry.origin = origin;
-        }
-        Some(_) => notes.push(Note::OriginIgnored),
-        None => {}
-    }
-    (geometry, notes)
+fn place(layout: &mut Layout, header: &NiftiHeader) {
+    let [_, dx, dy, dz, ..] = header.pixdim.map(|size| f64::from(size.abs()));
+    let (aligned, origin) = match affine(header) {
+        Some((matrix, origin)) => (is_aligned(&matrix), origin),
+        None => (true, [0.0; 3]),
+    };
+    layout.place([dx, dy, dz], origin, aligned);
 }
 
 /// The matrix from voxel indices to world axes, and the position of voxel (0, 0, 0).

@@ -9,11 +9,14 @@ use zfp_rs::{
     ZfpHeaderMask, ZfpMode,
 };
 
-use crate::convert::{Converter, Sample};
+use crate::convert::{Converter, Progress, Sample};
+use crate::encode::{Encoded, Encoder};
 use crate::error::{Error, Result};
-use crate::formats::{Headerless, ReadOptions};
 use crate::grid::{Grid, bits_per_block};
-use crate::source::{Format, Note};
+use crate::options::{Headerless, ReadOptions};
+use crate::sink::Sink;
+use crate::source::{Format, Note, SampleType, Source};
+use crate::stream::{Conversion, StreamEncoder};
 use crate::volume::{Decoder, ZfpVolume, fixed_rate, load_words};
 
 /// Reads a stream that starts with zfp's header.
@@ -22,17 +25,69 @@ pub(super) fn read(bytes: Arc<[u8]>, options: &ReadOptions) -> Result<ZfpVolume>
     let mut volume = if header.is_kept() {
         keep(&header, bytes)?
     } else {
-        match header.scalar_type {
-            ZfpScalarType::I32 => recode::<i32>(&header, &bytes, options),
-            ZfpScalarType::I64 => recode::<i64>(&header, &bytes, options),
-            ZfpScalarType::F32 => recode::<f32>(&header, &bytes, options),
-            ZfpScalarType::F64 => recode::<f64>(&header, &bytes, options),
-        }?
+        let encoder = Encoder::in_memory(header.dims, options.rate, false)?;
+        header.recode(&bytes, Converter::new(encoder, options, None)?)?.into_volume()?
     };
     if options.headerless.is_some() {
         volume.source.notes.push(Note::HeaderUsed);
     }
     Ok(volume)
+}
+
+/// Writes the stream `bytes` to `writer` at the rate asked for: as it is where that is its own
+/// already, otherwise decoded and encoded again.
+#[cfg(not(all(target_arch = "wasm32", target_os = "unknown")))]
+pub(super) fn convert(
+    bytes: Arc<[u8]>,
+    writer: impl Write,
+    options: &ReadOptions,
+    progress: Progress<'_>,
+) -> Result<Conversion> {
+    let bits = bits_per_block(options.rate)?;
+    let header = Header::parse(&bytes)?;
+    if header.is_kept() && header.config.max_bits() == bits {
+        let volume = keep(&header, bytes)?;
+        let total = volume.block_count();
+        let written = write_zfp(&volume, writer)?;
+        progress(total, total);
+        return Ok(Conversion::new(&volume, written));
+    }
+    let encoder = StreamEncoder::new(header.dims, options.rate, writer)?.into_inner();
+    let encoded = header.recode(&bytes, Converter::new(encoder, options, Some(progress))?)?;
+    Conversion::finish(encoded)
+}
+
+/// Writes a headerless stream to `writer` with zfp's header, at the rate asked for.
+#[cfg(not(all(target_arch = "wasm32", target_os = "unknown")))]
+pub(super) fn convert_headerless(
+    bytes: Arc<[u8]>,
+    layout: &Headerless,
+    writer: impl Write,
+    options: &ReadOptions,
+    progress: Progress<'_>,
+) -> Result<Conversion> {
+    let bits = bits_per_block(options.rate)?;
+    let volume = read_headerless(bytes, layout)?;
+    if volume.bits_per_block == bits {
+        let total = volume.block_count();
+        let written = write_zfp(&volume, writer)?;
+        progress(total, total);
+        return Ok(Conversion::new(&volume, written));
+    }
+    let encoder = StreamEncoder::new(volume.dims, options.rate, writer)?.into_inner();
+    let mut converter = Converter::new(encoder, options, Some(progress))?;
+    for block in volume.decoded_blocks() {
+        converter.push(block.samples.map(f64::from))?;
+    }
+    Conversion::finish(converter.finish(Format::ZfpHeaderless, SampleType::F32, 3)?)
+}
+
+/// Most bytes that a stream with this start can need, where its header is valid.
+pub(super) fn most_bytes(start: &[u8]) -> u64 {
+    let Ok(header) = Header::parse(start) else { return start.len() as u64 };
+    let blocks = Grid::unchecked(header.dims).block_count();
+    let bits = blocks.saturating_mul(u64::from(header.config.max_bits().max(64)));
+    (header.bits.saturating_add(bits) / 8).saturating_add(64)
 }
 
 /// Reads a stream without a header. Its length must fit, since nothing else tells wrong dims.
@@ -85,6 +140,15 @@ impl Header {
             && self.rank == 3
             && self.config.mode() == ZfpMode::FixedRate
     }
+
+    fn recode<S: Sink>(&self, bytes: &[u8], converter: Converter<'_, S>) -> Result<Encoded<S>> {
+        match self.scalar_type {
+            ZfpScalarType::I32 => recode::<i32, S>(self, bytes, converter),
+            ZfpScalarType::I64 => recode::<i64, S>(self, bytes, converter),
+            ZfpScalarType::F32 => recode::<f32, S>(self, bytes, converter),
+            ZfpScalarType::F64 => recode::<f64, S>(self, bytes, converter),
+        }
+    }
 }
 
 fn invalid(error: ZfpHeaderError, bytes: &[u8]) -> Error {
@@ -125,27 +189,30 @@ fn keep(header: &Header, bytes: Arc<[u8]>) -> Result<ZfpVolume> {
     let mut volume = ZfpVolume::from_stream(header.dims, bits_per_block, header.bits, bytes)?;
     volume.source.format = Format::Zfp;
     let end = volume.grid().stream_bytes(bits_per_block, header.bits);
-    note_trailing(&mut volume, end, found);
+    note_trailing(&mut volume.source, end, found);
     Ok(volume)
 }
 
 /// Bytes after the word in which a stream ends are no part of it.
-fn note_trailing(volume: &mut ZfpVolume, end: u64, found: u64) {
+fn note_trailing(source: &mut Source, end: u64, found: u64) {
     let trailing = found.saturating_sub(end.next_multiple_of(8));
     if trailing > 0 {
-        volume.source.notes.push(Note::TrailingBytes(trailing));
+        source.notes.push(Note::TrailingBytes(trailing));
     }
 }
 
 /// Decodes a stream of any mode block by block and encodes it anew. Fields of lower rank have the
 /// same blocks in the same order, only flat.
-fn recode<T: Sample>(header: &Header, bytes: &[u8], options: &ReadOptions) -> Result<ZfpVolume> {
+fn recode<T: Sample, S: Sink>(
+    header: &Header,
+    bytes: &[u8],
+    mut converter: Converter<'_, S>,
+) -> Result<Encoded<S>> {
     let (rank, block_size) = match header.rank {
         1 => (ZfpDimensionality::D1, 4),
         2 => (ZfpDimensionality::D2, 16),
         _ => (ZfpDimensionality::D3, 64),
     };
-    let mut converter = Converter::new(header.dims, options)?;
     let blocks = converter.block_count();
     let found = bytes.len() as u64;
     let least = u64::from(header.config.min_bits());
@@ -164,9 +231,9 @@ fn recode<T: Sample>(header: &Header, bytes: &[u8], options: &ReadOptions) -> Re
         }
         converter.push(samples.map(Sample::to_f64))?;
     }
-    let mut volume = converter.finish(Format::Zfp, header.scalar_type.into(), header.rank)?;
-    note_trailing(&mut volume, position.div_ceil(8), found);
-    Ok(volume)
+    let mut encoded = converter.finish(Format::Zfp, header.scalar_type.into(), header.rank)?;
+    note_trailing(&mut encoded.source, position.div_ceil(8), found);
+    Ok(encoded)
 }
 
 /// Writes a volume with zfp's own header, so that the `zfp` program (option `-h`) and libzfp read
@@ -183,20 +250,20 @@ pub fn write_zfp(volume: &ZfpVolume, writer: impl Write) -> Result<u64> {
     if found < expected {
         return Err(Error::TooShort { expected, found });
     }
-    let (words, header_bits) = header_words(volume)?;
+    let (words, header_bits) = header_words(volume.dims, volume.bits_per_block)?;
     let total = grid.block_count() * u64::from(volume.bits_per_block);
     write_words(volume, &words, header_bits, total, writer)
         .map_err(|source| Error::Io { name: "the zfp stream to write".into(), source })
 }
 
-/// The header of a volume as words, and its length in bits.
-fn header_words(volume: &ZfpVolume) -> Result<(Vec<u64>, u32)> {
+/// The header of a fixed-rate stream as words, and its length in bits.
+pub(crate) fn header_words(dims: [u32; 3], bits_per_block: u32) -> Result<(Vec<u64>, u32)> {
     let codec = |reason: String| Error::Codec { reason };
-    let [nx, ny, nz] = volume.dims.map(|n| n as usize);
+    let [nx, ny, nz] = dims.map(|n| n as usize);
     let metadata = ZfpFieldMetadata { scalar_type: ZfpScalarType::F32, dims: [nx, ny, nz, 0] };
     let mut stream = ZfpBitStream::new(24).map_err(|error| codec(error.to_string()))?;
     let bits = stream
-        .write_header(&fixed_rate(volume.bits_per_block), &metadata, ZfpHeaderMask::FULL)
+        .write_header(&fixed_rate(bits_per_block), &metadata, ZfpHeaderMask::FULL)
         .map_err(|error| codec(error.to_string()))?;
     Ok((stream.into_words(), bits as u32))
 }
