@@ -229,6 +229,22 @@ fn reads_streams_with_and_without_a_header_alike() {
 }
 
 #[test]
+fn reads_raw_samples_of_a_given_type() {
+    let folder = folder("raw");
+    let volume = path(&folder, "ramp.bin");
+    let samples: Vec<u8> = (0..10 * 9 * 8u16).flat_map(|i| (i % 10).to_be_bytes()).collect();
+    std::fs::write(&volume, samples).unwrap();
+    let layout = ["--dims", "10,9,8", "--type", "uint16", "--big-endian", "--rate", "16"];
+    let printed = succeed(&[&["info", &volume], &layout[..]].concat());
+    for part in ["u16 samples", "10 x 9 x 8", "0 to 9", "1024 bits per block"] {
+        assert!(printed.contains(part), "no \"{part}\" in\n{printed}");
+    }
+    refuse(&["info", &volume, "--dims", "10,9,7", "--type", "uint16"], &["hint"]);
+    refuse(&["info", &volume, "--dims", "10,9,8", "--type", "byte"], &["uint8"]);
+    refuse(&["info", &volume, "--type", "uint8"], &["--dims"]);
+}
+
+#[test]
 fn stops_early_on_request() {
     let folder = folder("stop");
     let report = path(&folder, "r.json");

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use volume_io::SampleType;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -11,9 +12,9 @@ Examples:
   render --volume stream.zfp --dims 512,512,256 --rate 4 --iso -0.2 --eye -10,5,3 --color s.png
   render --volume gyroid:128x128x128 --rate 6 --color gyroid.png
 
-A volume is a file (zfp with or without its own header, NIfTI, NIfTI in gzip), `brain` for the
-bundled scan, or a generator with its size: sphere, plane, marschner-lobb, gyroid, shells,
-turbulence or rough-solid, as in gyroid:128x128x128.
+A volume is a file (zfp with or without its own header, NIfTI, NumPy, NRRD, VTK ImageData, MRC,
+raw samples; most of them also in gzip), `brain` for the bundled scan, or a generator with its size:
+sphere, plane, marschner-lobb, gyroid, shells, turbulence or rough-solid, as in gyroid:128x128x128.
 
 World space: voxel (i, j, k) lies at origin + spacing * (i, j, k); right-handed.
 
@@ -99,10 +100,17 @@ pub enum Strategy {
 /// How to read the volume.
 #[derive(Args, Debug)]
 pub struct InputOptions {
-    /// Voxels of a zfp stream without a header; needs --rate
-    #[arg(long, value_name = "X,Y,Z", value_parser = sizes, requires = "rate")]
+    /// Voxels of a zfp stream without a header (with --rate) or of a raw file (with --type)
+    #[arg(long, value_name = "X,Y,Z", value_parser = sizes)]
     pub dims: Option<[u32; 3]>,
-    /// Bits per voxel: of a stream without a header, or to encode other input with (then 8 if left out)
+    /// Type of a raw file's samples, such as uint8, int16 or float32
+    #[arg(long = "type", value_name = "T", value_parser = sample_type, requires = "dims")]
+    pub sample_type: Option<SampleType>,
+    /// The samples of a raw file have their most significant byte first
+    #[arg(long)]
+    pub big_endian: bool,
+    /// Bits per voxel: of a zfp stream without a header, or to encode other input with (then 8 if
+    /// left out)
     #[arg(long, value_name = "R", value_parser = positive)]
     pub rate: Option<f64>,
     /// Distance between voxels, instead of the file's
@@ -113,10 +121,13 @@ pub struct InputOptions {
     pub origin: Option<[f64; 3]>,
     /// Takes the place of NaN and infinity in uncompressed input
     #[arg(long, value_name = "V", value_parser = finite_f32, allow_hyphen_values = true)]
-    pub replace: Option<f32>,
-    /// Which volume of a series, counted from 0
-    #[arg(long, value_name = "INDEX")]
-    pub time: Option<u32>,
+    pub replace_nan: Option<f32>,
+    /// Which volume to take from a file with several, counted from 0
+    #[arg(long, value_name = "N")]
+    pub time_index: Option<u32>,
+    /// Which array to take from a file with several
+    #[arg(long, value_name = "NAME")]
+    pub array: Option<String>,
 }
 
 /// What the plan depends on.
@@ -174,6 +185,11 @@ fn finite(text: &str) -> Result<f64, String> {
 fn finite_f32(text: &str) -> Result<f32, String> {
     let value = finite(text)? as f32;
     if value.is_finite() { Ok(value) } else { Err(format!("{text} exceeds 32-bit floats")) }
+}
+
+fn sample_type(text: &str) -> Result<SampleType, String> {
+    SampleType::from_raw_name(text)
+        .ok_or_else(|| "expected a type such as uint8, int16 or float32".into())
 }
 
 fn positive(text: &str) -> Result<f64, String> {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use progressive_iso::{RendererOptions, ScenePlan, wgpu};
-use volume_io::{Headerless, ReadOptions, ZfpVolume};
+use volume_io::{Format, Headerless, RawLayout, ReadOptions, ZfpVolume};
 
 use crate::arguments::{InputOptions, SceneOptions, generator_size};
 use crate::problem::Problem;
@@ -26,9 +26,10 @@ pub struct Input {
 impl Input {
     /// Reads a file or, where there is none of this name, makes a generator's volume.
     pub fn read(name: &str, options: &InputOptions) -> Result<Self, Problem> {
+        let read_options = read_options(options)?;
         let (volume, known_isovalue) = match Generated::parse(name) {
             Some(generated) if !Path::new(name).exists() => generated.volume(options)?,
-            _ => (volume_io::read_file(name, &read_options(options))?, None),
+            _ => (volume_io::read_file(name, &read_options)?, None),
         };
         let mut input = Self { name: name.into(), volume, known_isovalue, notes: Vec::new() };
         input.note_unused(options);
@@ -40,7 +41,8 @@ impl Input {
 
     fn note_unused(&mut self, options: &InputOptions) {
         let source = &self.volume.source;
-        let headerless = source.format == volume_io::Format::ZfpHeaderless;
+        let takes_dims = matches!(source.format, Format::ZfpHeaderless | Format::Raw);
+        let takes_rate = source.encoded || source.format == Format::ZfpHeaderless;
         self.notes.extend(source.notes.iter().map(ToString::to_string));
         if source.tiny_blocks > 0 {
             let text = "blocks hold nothing above 2^-96 in size and are taken as 0";
@@ -49,10 +51,11 @@ impl Input {
         if source.replaced > 0 {
             self.notes.push(format!("{} samples that were not finite replaced", source.replaced));
         }
-        if options.dims.is_some() && !headerless {
-            self.notes.push("--dims is for zfp streams without a header and was not used".into());
+        if options.dims.is_some() && !takes_dims {
+            let text = "--dims is for zfp streams without a header and raw files, and was not used";
+            self.notes.push(text.into());
         }
-        if options.rate.is_some() && !headerless && !source.encoded {
+        if options.rate.is_some() && !takes_rate {
             self.notes.push("the stream has its own rate, --rate was not used".into());
         }
     }
@@ -65,7 +68,7 @@ impl Input {
         let mut text = format!("volume        {}\n", self.name);
         let mut line = |name: &str, value: String| text += &format!("{name:<13} {value}\n");
         let format = match source.format {
-            volume_io::Format::Memory => "generated".into(),
+            Format::Memory => "generated".into(),
             format => format.to_string(),
         };
         line("format", format!("{format}, {} samples", source.sample_type));
@@ -139,14 +142,23 @@ fn triple([x, y, z]: [f64; 3]) -> String {
     format!("{x}, {y}, {z}")
 }
 
-fn read_options(options: &InputOptions) -> ReadOptions {
-    let headerless = options.dims.zip(options.rate);
-    ReadOptions {
-        rate: options.rate.unwrap_or(DEFAULT_RATE),
-        replace_non_finite: options.replace,
-        headerless: headerless.map(|(dims, rate)| Headerless { dims, rate }),
-        time_index: options.time,
+fn read_options(options: &InputOptions) -> Result<ReadOptions, Problem> {
+    let (dims, sample_type) = (options.dims, options.sample_type);
+    if dims.is_some() && options.rate.is_none() && sample_type.is_none() {
+        let hint = "add --rate R for a zfp stream without a header, --type T for a raw file";
+        return Err(Problem::input("--dims alone does not say how to read a file").hint(hint));
     }
+    let raw = dims.zip(sample_type).map(|(dims, sample_type)| RawLayout { dims, sample_type });
+    let headerless = dims.zip(options.rate).filter(|_| raw.is_none());
+    Ok(ReadOptions {
+        rate: options.rate.unwrap_or(DEFAULT_RATE),
+        replace_non_finite: options.replace_nan,
+        headerless: headerless.map(|(dims, rate)| Headerless { dims, rate }),
+        time_index: options.time_index,
+        raw,
+        big_endian: options.big_endian,
+        array: options.array.clone(),
+    })
 }
 
 /// A volume that this program can make itself.

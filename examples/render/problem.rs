@@ -68,11 +68,14 @@ impl From<volume_io::Error> for Problem {
                 "give a file that can be read, `brain`, or a generator such as gyroid:128x128x128"
             }
             Error::UnknownFormat { .. } | Error::HeaderlessNeedsLayout { .. } => {
-                "for a zfp stream without a header add --dims X,Y,Z --rate R"
+                "for a zfp stream without a header add --dims X,Y,Z --rate R, for raw samples --type T"
             }
-            Error::NonFinite { .. } => "--replace V reads it anyway",
-            Error::SeveralVolumes { .. } | Error::TimeIndex { .. } => "choose with --time INDEX",
+            Error::NonFinite { .. } => "--replace-nan V reads it anyway",
+            Error::SeveralVolumes { .. } | Error::TimeIndex { .. } => "choose with --time-index N",
             Error::LengthMismatch { .. } => "check --dims and --rate",
+            Error::RawNeedsLayout { .. } => "add --dims X,Y,Z --type T",
+            Error::RawLength { .. } => "check --dims and --type",
+            Error::NoSuchArray { .. } => "choose with --array NAME",
             Error::Rate { .. } => "see --rate",
             _ => return Self::input(&error),
         };
