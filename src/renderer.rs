@@ -67,6 +67,7 @@ pub struct ProgressiveIsoRenderer {
     frame: Option<FrameState>,
     frame_count: u64,
     active_isovalue: Option<f32>,
+    clear_cache: bool,
     submitted: Vec<Submitted>,
     report: PassReport,
 }
@@ -179,6 +180,7 @@ impl ProgressiveIsoRenderer {
             frame: None,
             frame_count: 0,
             active_isovalue: None,
+            clear_cache: false,
             submitted: Vec::new(),
             report: PassReport::default(),
         })
@@ -322,6 +324,9 @@ impl ProgressiveIsoRenderer {
         let (stages, frame) = (&self.stages, &state.frame);
         let isovalue = frame.isovalues[0];
         let (counters, bytes) = lru_cache_gpu::Counters::BYTES;
+        if std::mem::take(&mut self.clear_cache) {
+            stages.service.record_clear(encoder, &self.cache);
+        }
         encoder.copy_buffer_to_buffer(self.cache.state(), counters, &self.cache_before, 0, bytes);
         stages.service.record_begin_frame(encoder, &self.cache);
         if self.active_isovalue != Some(isovalue) {
@@ -511,6 +516,12 @@ impl ProgressiveIsoRenderer {
         queue.submit([encoder.finish()]);
         wait(device)?;
         pending.try_take().ok_or_else(|| Error::Device("the pictures could not be mapped".into()))
+    }
+
+    /// Forgets all decoded blocks when the next frame starts, as if the volume had just been loaded:
+    /// for measuring.
+    pub fn clear_cache(&mut self) {
+        self.clear_cache = true;
     }
 
     /// Changes the picture's size. The current frame starts again, with decoded blocks kept where

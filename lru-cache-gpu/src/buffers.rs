@@ -48,9 +48,8 @@ impl CacheBuffers {
             let desc = wgpu::BufferDescriptor { label, size, usage, mapped_at_creation: false };
             ledger.buffer(device, category, &desc)
         };
-        let storage = Usage::STORAGE | Usage::COPY_SRC;
-        let scratch =
-            |label, size| buffer(Category::Scratch, label, size, storage | Usage::COPY_DST);
+        let storage = Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST;
+        let scratch = |label, size| buffer(Category::Scratch, label, size, storage);
         let slots = plan
             .pages()
             .map(|count| buffer(Category::Slots, "lru.slots", count * SLOT_BYTES, storage))

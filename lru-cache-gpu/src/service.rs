@@ -143,6 +143,12 @@ impl Service {
         ]
     }
 
+    /// Records forgetting every block; the counters start at 0 again. A frame must start next.
+    pub fn record_clear(&self, encoder: &mut wgpu::CommandEncoder, cache: &CacheBuffers) {
+        encoder.clear_buffer(&cache.directory, 0, None);
+        encoder.clear_buffer(&cache.state, 0, None);
+    }
+
     /// Records the start of a frame. Needed once before the first round, too.
     pub fn record_begin_frame(&self, encoder: &mut wgpu::CommandEncoder, cache: &CacheBuffers) {
         let mut pass = begin(encoder, "lru.begin_frame");
