@@ -3,3 +3,4 @@
 pub mod compact;
 pub mod indirect;
 pub mod scan;
+pub mod sort;

@@ -1,5 +1,5 @@
 //! GPU building blocks shared by more than one stage: WGSL composition, accounted memory, upload,
-//! readback, indirect arguments, scan and stream compaction.
+//! readback, indirect arguments, scan, stream compaction and a key-value sort.
 //!
 //! Everything here only records commands: nothing submits, polls, maps synchronously or blocks.
 //! Counts stay on the GPU and drive indirect dispatches.
@@ -13,6 +13,7 @@ pub mod kernel;
 pub mod memory;
 pub mod readback;
 pub mod scan;
+pub mod sort;
 pub mod upload;
 pub mod wgsl;
 

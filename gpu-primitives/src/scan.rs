@@ -87,7 +87,15 @@ impl ScanPlan {
     /// Dispatches that one recording makes.
     #[must_use]
     pub fn dispatches(&self) -> u64 {
-        1 + 2 * self.upper_levels() + u64::from(self.upper_levels() > 0)
+        self.args_dispatches() + self.sums_dispatches()
+    }
+
+    pub(crate) fn args_dispatches(&self) -> u64 {
+        u64::from(self.upper_levels() > 0)
+    }
+
+    pub(crate) fn sums_dispatches(&self) -> u64 {
+        1 + 2 * self.upper_levels()
     }
 
     /// Levels above the first, each of which costs an addition.
@@ -172,9 +180,19 @@ impl Scan {
 
     /// Records the scan in a pass of the caller.
     pub fn record_in(&self, pass: &mut wgpu::ComputePass<'_>, buffers: &ScanBuffers) {
+        self.record_args_in(pass, buffers);
+        self.record_sums_in(pass, buffers);
+    }
+
+    /// The part of [`Scan::record_in`] that depends on the count alone.
+    pub(crate) fn record_args_in(&self, pass: &mut wgpu::ComputePass<'_>, buffers: &ScanBuffers) {
         if let Some(args) = &buffers.args {
             self.args.record_in(pass, &args.bind);
         }
+    }
+
+    /// The rest of [`Scan::record_in`], for as many times as the count stays the same.
+    pub(crate) fn record_sums_in(&self, pass: &mut wgpu::ComputePass<'_>, buffers: &ScanBuffers) {
         for (level, bind) in (0u64..).zip(&buffers.local) {
             match &buffers.args {
                 Some(args) if level < buffers.add.len() as u64 => {

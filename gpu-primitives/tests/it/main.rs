@@ -7,6 +7,7 @@ mod memory;
 mod readback;
 mod scan;
 mod shaders;
+mod sort;
 mod upload;
 
 use gpu_primitives::wgpu;

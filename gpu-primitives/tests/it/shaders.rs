@@ -5,6 +5,7 @@ use gpu_primitives::compact::Compact;
 use gpu_primitives::indirect::IndirectArgs;
 use gpu_primitives::kernel::{Binding, KernelSource};
 use gpu_primitives::scan::Scan;
+use gpu_primitives::sort::Sort;
 use naga::proc::Layouter;
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use naga::{AddressSpace, StorageAccess};
@@ -22,6 +23,7 @@ fn sources() -> Vec<KernelSource> {
     let mut sources = vec![IndirectArgs::source()];
     sources.extend(Scan::sources());
     sources.extend(Compact::sources());
+    sources.extend(Sort::sources());
     sources
 }
 
