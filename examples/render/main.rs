@@ -9,6 +9,7 @@ mod problem;
 #[path = "../support/mod.rs"]
 mod support;
 
+use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -44,8 +45,10 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments) -> Result<(), Problem> {
     if let Some(Command::Info { volume, input, scene }) = &arguments.command {
         let input = Input::read(volume, input)?;
-        print!("{}{}", input.describe(), input.statistics());
-        println!("\n{}", input.plan(scene)?);
+        let (what, statistics) = (input.describe(), input.statistics());
+        // Whoever reads only the first lines has what they want: a closed pipe is no failure.
+        writeln!(std::io::stdout(), "{what}{statistics}").ok();
+        writeln!(std::io::stdout(), "{}", input.plan(scene)?).ok();
         return Ok(());
     }
     if arguments.list_adapters {
