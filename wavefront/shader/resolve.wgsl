@@ -37,17 +37,11 @@ fn lru_slots_per_page() -> u32 {
     return frame.lru.slots_per_page;
 }
 
+fn block_use(slot: u32) {}
+
 // Finds the hit again: the first crossing in the block, whose samples are still resident.
 fn hit_in_block(ray: DdaRay, block: vec3<i32>) -> BlockWalk {
-    for (var i = 0u; i < 8u; i++) {
-        let neighbour = block + vec3<i32>(vec3<u32>(i & 1u, (i >> 1u) & 1u, i >> 2u));
-        block_slots[i] = 0u;
-        if (all(vec3<u32>(neighbour) < frame.grid.blocks)) {
-            // A neighbour that the ray's cells do not need may be absent.
-            let slot = lru_lookup(macrocell_linear(neighbour, frame.grid.blocks));
-            block_slots[i] = select(slot, 0u, slot == LRU_MISSING);
-        }
-    }
+    block_open(block);
     let box = dda_box(block * 4, 2u, frame.grid.last_cell);
     let entry = dda_entry(ray, box);
     return block_walk(ray, MacrocellPlace(entry, dda_cell_after(ray, entry, box)), box, frame.isovalue);

@@ -33,56 +33,43 @@ fn macrocell_mask(index: u32) -> vec2<u32> {
     return masks[index];
 }
 
-fn neighbour(block: vec3<i32>, index: u32) -> u32 {
-    let offset = vec3<i32>(vec3<u32>(index & 1u, (index >> 1u) & 1u, index >> 2u));
-    return macrocell_linear(block + offset, frame.grid.blocks);
+fn block_use(slot: u32) {
+    lru_touch(slot);
 }
 
-// Fills block_slots with the needed blocks' slots and keeps them; false when one is missing.
-fn take_slots(block: vec3<i32>, need: u32) -> bool {
-    var complete = true;
-    for (var i = 0u; i < 8u; i++) {
-        if (((need >> i) & 1u) != 0u) {
-            let slot = lru_lookup(neighbour(block, i));
-            block_slots[i] = slot;
-            if (slot == LRU_MISSING) {
-                complete = false;
-            } else {
-                lru_touch(slot);
-            }
-        }
-    }
-    return complete;
-}
-
-// The oldest active ray leads: it is served whatever the others ask for.
-fn request_missing(block: vec3<i32>, need: u32, leads: bool) {
+// Keeps or requests the needed samples of the opened block. The oldest active ray leads: it is served
+// whatever the others ask for.
+fn request(need: u32, leads: bool) {
     var led = 0u;
-    for (var i = 0u; i < 8u; i++) {
-        if (((need >> i) & 1u) != 0u) {
-            if (leads) {
-                lru_lead(led, neighbour(block, i));
-                led++;
-            } else if (block_slots[i] == LRU_MISSING) {
-                lru_request(neighbour(block, i));
-            }
+    for (var rest = need; rest != 0u; rest &= rest - 1u) {
+        let block = block_neighbour(countTrailingZeros(rest));
+        let slot = lru_lookup(block);
+        if (slot != LRU_MISSING) {
+            lru_touch(slot);
+        } else if (!leads) {
+            lru_request(block);
+        }
+        if (leads) {
+            lru_lead(led, block);
+            led++;
         }
     }
 }
 
-// Requests what the ray will need in the next active blocks on its way, should they hold no hit.
-fn look_ahead(ray: DdaRay, start: MacrocellPlace) {
+// Requests what the ray needs from its place on: in the block there, and in the next active blocks
+// on its way, should it hold no hit.
+fn request_ahead(ray: DdaRay, start: MacrocellPlace, leads: bool) {
     var place = start;
-    for (var ahead = 1u; ahead < frame.look_ahead; ahead++) {
-        place = macrocell_advance(frame.grid, ray, macrocell_leave(frame.grid, ray, place, 2u));
-        if (!macrocell_inside(frame.grid, place.cell)) {
-            return;
+    for (var ahead = 0u; ahead < frame.look_ahead; ahead++) {
+        if (ahead > 0u) {
+            place = macrocell_advance(frame.grid, ray, macrocell_leave(frame.grid, ray, place, 2u));
+            if (!macrocell_inside(frame.grid, place.cell)) {
+                return;
+            }
         }
-        let block = place.cell >> vec3<u32>(2u);
+        block_open(place.cell >> vec3<u32>(2u));
         let need = block_need(ray, place, dda_box(place.cell, 2u, frame.grid.last_cell));
-        if (!take_slots(block, need)) {
-            request_missing(block, need, false);
-        }
+        request(need, leads && ahead == 0u);
     }
 }
 
@@ -97,16 +84,16 @@ fn walk(ray: DdaRay, first_block: vec3<i32>, leads: bool) -> u32 {
             return RAY_DONE;
         }
         let block = place.cell >> vec3<u32>(2u);
+        let state = macrocell_linear(block, frame.grid.blocks);
+        block_open(block);
         let box = dda_box(place.cell, 2u, frame.grid.last_cell);
-        let need = block_need(ray, place, box);
-        if (!take_slots(block, need)) {
-            request_missing(block, need, leads);
-            look_ahead(ray, place);
-            return RAY_ACTIVE | macrocell_linear(block, frame.grid.blocks);
-        }
         let result = block_walk(ray, place, box, frame.isovalue);
         if (result.hit) {
-            return RAY_HIT | macrocell_linear(block, frame.grid.blocks);
+            return RAY_HIT | state;
+        }
+        if (result.missing) {
+            request_ahead(ray, place, leads);
+            return RAY_ACTIVE | state;
         }
         place = result.place;
     }

@@ -1,9 +1,12 @@
-// A ray's way through the dual cells of one block whose samples are at hand. The importing text supplies
+// A ray's way through the dual cells of one block. The importing text supplies
+// fn block_take(need: u32) -> bool, whether the samples of the needed blocks are at hand (bit 0 the
+// block itself, bit n its plus-side neighbour n = x + 2y + 4z), and
 // fn block_sample(x: i32, y: i32, z: i32) -> f32, the sample at 0 ..= 4 on each axis from the block's first.
 #import cell
 
 struct BlockWalk {
     hit: bool,
+    missing: bool,         // stopped at a cell with samples that are not at hand
     place: MacrocellPlace, // the hit's cell and how it was entered, or the first cell after the block
     exit: DdaEvent,        // where the ray leaves the hit's cell
     corners: CellCorners,  // of the hit's cell
@@ -12,27 +15,30 @@ struct BlockWalk {
     inside_low: bool,
 }
 
-// Which blocks' samples the cells that the ray visits in `box` need: bit 0 for the block itself, bit n for
-// the plus-side neighbour n = x + 2y + 4z.
+// Blocks that a dual cell's samples lie in.
+fn block_cell_need(cell: vec3<i32>) -> u32 {
+    let upper = (cell & vec3<i32>(3)) == vec3<i32>(3);
+    var need = 1u;
+    need |= select(0u, need << 1u, upper.x);
+    need |= select(0u, need << 2u, upper.y);
+    need |= select(0u, need << 4u, upper.z);
+    return need;
+}
+
+// Blocks that the samples of all cells lie in that the ray visits in `box`.
 fn block_need(ray: DdaRay, start: MacrocellPlace, box: DdaBox) -> u32 {
     var need = 0u;
     var cell = start.cell;
     while (all(cell >= box.low) && all(cell <= box.high)) {
-        let upper = (cell & vec3<i32>(3)) == vec3<i32>(3);
-        var mask = 1u;
-        mask |= select(0u, mask << 1u, upper.x);
-        mask |= select(0u, mask << 2u, upper.y);
-        mask |= select(0u, mask << 4u, upper.z);
-        need |= mask;
+        need |= block_cell_need(cell);
         cell = block_next(ray, cell, dda_exit(ray, DdaBox(cell, cell)));
     }
     return need;
 }
 
 fn block_next(ray: DdaRay, cell: vec3<i32>, exit: DdaEvent) -> vec3<i32> {
-    var next = cell;
-    next[exit.axis] += select(1, -1, ray.direction[exit.axis] < 0.0);
-    return next;
+    let step = select(vec3<i32>(1), vec3<i32>(-1), ray.direction < vec3<f32>(0.0));
+    return cell + select(vec3<i32>(0), step, dda_on_axis(exit.axis));
 }
 
 fn block_corners(cell: vec3<i32>, isovalue: f32) -> CellCorners {
@@ -55,6 +61,10 @@ fn block_walk(ray: DdaRay, start: MacrocellPlace, box: DdaBox, isovalue: f32) ->
     var inside_known = false;
     while (all(walk.place.cell >= box.low) && all(walk.place.cell <= box.high)) {
         let cell = walk.place.cell;
+        if (!block_take(block_cell_need(cell))) {
+            walk.missing = true;
+            return walk;
+        }
         walk.exit = dda_exit(ray, DdaBox(cell, cell));
         walk.corners = block_corners(cell, isovalue);
         if (cell_all_inside(walk.corners)) {

@@ -38,11 +38,8 @@ fn cell_all_outside(corners: CellCorners) -> bool {
 // Coordinates in [0, 1]^3 of the ray at `event`; exact on the event's own axis.
 fn cell_local(ray: DdaRay, event: DdaEvent, cell: vec3<i32>) -> vec3<f32> {
     let position = (ray.origin - vec3<f32>(cell)) + event.t * ray.direction;
-    var local = clamp(position, vec3<f32>(0.0), vec3<f32>(1.0));
-    if (event.axis != DDA_START) {
-        local[event.axis] = f32(event.plane - cell[event.axis]);
-    }
-    return local;
+    let local = clamp(position, vec3<f32>(0.0), vec3<f32>(1.0));
+    return select(local, vec3<f32>(vec3<i32>(event.plane) - cell), dda_on_axis(event.axis));
 }
 
 // Bernstein coefficients along the segment from `a` to `b`: the field's polar form.
