@@ -3,7 +3,9 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use proptest::prelude::*;
-use volume_io::{Headerless, Histogram, ReadOptions, ZfpVolume, read_bytes, write_zfp};
+use volume_io::{
+    Headerless, Histogram, RawLayout, ReadOptions, SampleType, ZfpVolume, read_bytes, write_zfp,
+};
 
 const FILES: [&str; 17] = [
     "accuracy.zfp",
@@ -25,9 +27,51 @@ const FILES: [&str; 17] = [
     "series.nii.gz",
 ];
 
-fn files() -> Vec<Vec<u8>> {
+const RAW: [&str; 2] = ["raw/ramp_7x5x6_float64.raw", "raw/zipped_7x5x6_uint16.raw.gz"];
+
+const NPY: [&str; 6] = [
+    "npy/fortran.npy",
+    "npy/record.npy",
+    "npy/series.npy",
+    "npy/slice_fortran.npy",
+    "npy/version_3.npy",
+    "npy/zipped.npy.gz",
+];
+
+const NRRD: [&str; 6] = [
+    "nrrd/big_endian.nrrd",
+    "nrrd/detached_raw.nhdr",
+    "nrrd/gzip.nrrd",
+    "nrrd/spacings.nrrd",
+    "nrrd/turned.nrrd",
+    "nrrd/vectors.nrrd",
+];
+
+const VTI: [&str; 9] = [
+    "vti/appended_32.vti",
+    "vti/appended_base64_zlib_64.vti",
+    "vti/appended_zlib_32.vti",
+    "vti/ascii_float64.vti",
+    "vti/ascii_int8.vti",
+    "vti/big_endian.vti",
+    "vti/binary_zlib_32.vti",
+    "vti/cells_binary.vti",
+    "vti/several.vti",
+];
+
+const MRC: [&str; 6] = [
+    "mrc/big_endian.mrc",
+    "mrc/extended.mrc",
+    "mrc/float16.mrc",
+    "mrc/order_312.mrc",
+    "mrc/stack.mrc",
+    "mrc/zipped.mrc.gz",
+];
+
+/// Names and contents of some files.
+fn files(names: &[&'static str]) -> Vec<(&'static str, Vec<u8>)> {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data");
-    FILES.iter().map(|name| std::fs::read(format!("{folder}/{name}")).unwrap()).collect()
+    names.iter().map(|name| (*name, std::fs::read(format!("{folder}/{name}")).unwrap())).collect()
 }
 
 fn options() -> impl Strategy<Value = ReadOptions> {
@@ -41,6 +85,8 @@ fn options() -> impl Strategy<Value = ReadOptions> {
                 rate: if rate.abs() > 100.0 { 2.0 } else { rate },
             }),
             time_index: index,
+            big_endian: replace,
+            array: index.map(|index| ["density", "last", ""][index as usize % 3].into()),
             ..ReadOptions::default()
         }
     })
@@ -48,8 +94,8 @@ fn options() -> impl Strategy<Value = ReadOptions> {
 
 /// Reads, and where that succeeds uses what was read. Mutated headers may claim volumes that a
 /// zero block of one bit can really back: those are read but not decoded here.
-fn exercise(bytes: &[u8], options: &ReadOptions) {
-    let Ok(volume) = read_bytes("fuzz.zfp", bytes, options) else { return };
+fn exercise(name: &str, bytes: &[u8], options: &ReadOptions) {
+    let Ok(volume) = read_bytes(name, bytes, options) else { return };
     check(&volume);
 }
 
@@ -112,6 +158,55 @@ fn mutation() -> impl Strategy<Value = Mutation> {
     ]
 }
 
+/// A file with some changes, of which some are digits, since headers are often text.
+fn changed_file(names: &[&'static str]) -> impl Strategy<Value = (&'static str, Vec<u8>)> {
+    let changes = prop::collection::vec(mutation(), 0..6);
+    let header = prop::collection::vec((0..400usize, any::<u8>()), 0..3);
+    let digits = prop::collection::vec((any::<prop::sample::Index>(), b'0'..=b'9'), 0..3);
+    let file = prop::sample::select(files(names));
+    (file, changes, header, digits).prop_map(|((name, mut bytes), changes, header, digits)| {
+        for change in &changes {
+            change.apply(&mut bytes);
+        }
+        for (at, value) in header {
+            if let Some(byte) = bytes.get_mut(at) {
+                *byte = value;
+            }
+        }
+        let places: Vec<usize> = (0..bytes.len()).filter(|&i| bytes[i].is_ascii_digit()).collect();
+        for (at, digit) in digits {
+            if !places.is_empty() {
+                bytes[places[at.index(places.len())]] = digit;
+            }
+        }
+        (name, bytes)
+    })
+}
+
+/// Something that an image may be made of.
+fn tag_part() -> impl Strategy<Value = String> {
+    let known = prop::sample::select(vec![
+        "type=\"ImageData\" byte_order=\"BigEndian\">",
+        "type=\"ImageData\" compressor=\"vtkZLibDataCompressor\">",
+        "<ImageData WholeExtent=\"0 1 0 1 0 0\" Spacing=\"1 0 -1\">",
+        "<Piece Extent=\"0 1 0 1 0 0\">",
+        "<PointData>",
+        "<CellData Scalars=\"a\">",
+        "<DataArray type=\"UInt8\" format=\"ascii\">",
+        "<DataArray type=\"Int16\" Name=\"a\" format=\"binary\">",
+        "<DataArray type=\"Float32\" format=\"appended\" offset=\"0\">",
+        "</PointData>",
+        "<AppendedData encoding=\"raw\">_",
+        "<AppendedData encoding=\"base64\"> _",
+        "AAAAEAAAAAAAAA==",
+        "1 2 3 4 ",
+        "<!--",
+        "-->",
+        "</VTKFile>",
+    ]);
+    prop_oneof![4 => known.prop_map(String::from), 1 => "[ -~]{0,6}"]
+}
+
 proptest! {
     #![proptest_config(ProptestConfig {
         cases: 2000,
@@ -127,7 +222,7 @@ proptest! {
     ) {
         let mut file = start.to_vec();
         file.extend(bytes);
-        exercise(&file, &options);
+        exercise("fuzz.zfp", &file, &options);
     }
 
     #[test]
@@ -142,26 +237,50 @@ proptest! {
         }
         bytes[344..348].copy_from_slice(b"n+1\0");
         bytes[108..112].copy_from_slice(&352.0f32.to_le_bytes());
-        exercise(&bytes, &options);
+        exercise("fuzz.nii", &bytes, &options);
     }
 
     #[test]
-    fn mutated_files(
-        file in prop::sample::select(files()),
-        changes in prop::collection::vec(mutation(), 1..6),
-        header in prop::collection::vec((0..400usize, any::<u8>()), 0..3),
+    fn mutated_files(changed in changed_file(&FILES), options in options()) {
+        exercise(changed.0, &changed.1, &options);
+    }
+
+    #[test]
+    fn mutated_raw_files(
+        changed in changed_file(&RAW),
+        options in options(),
+        layout in prop::option::of(([0..9u32, 0..9, 0..9], prop::sample::select(SampleType::ALL))),
+    ) {
+        let raw = layout.map(|(dims, sample_type)| RawLayout { dims, sample_type });
+        exercise(changed.0, &changed.1, &ReadOptions { raw, ..options });
+    }
+
+    #[test]
+    fn mutated_npy_files(changed in changed_file(&NPY), options in options()) {
+        exercise(changed.0, &changed.1, &options);
+    }
+
+    #[test]
+    fn mutated_nrrd_files(changed in changed_file(&NRRD), options in options()) {
+        exercise(changed.0, &changed.1, &options);
+    }
+
+    #[test]
+    fn mutated_vti_files(changed in changed_file(&VTI), options in options()) {
+        exercise(changed.0, &changed.1, &options);
+    }
+
+    #[test]
+    fn mutated_mrc_files(changed in changed_file(&MRC), options in options()) {
+        exercise(changed.0, &changed.1, &options);
+    }
+
+    #[test]
+    fn text_between_tags(
+        parts in prop::collection::vec(tag_part(), 0..30),
         options in options(),
     ) {
-        let mut bytes = file;
-        for change in &changes {
-            change.apply(&mut bytes);
-        }
-        for (at, value) in header {
-            if let Some(byte) = bytes.get_mut(at) {
-                *byte = value;
-            }
-        }
-        exercise(&bytes, &options);
+        exercise("fuzz.vti", format!("<VTKFile {}", parts.concat()).as_bytes(), &options);
     }
 
     #[test]

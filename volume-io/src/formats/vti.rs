@@ -26,6 +26,7 @@ pub(super) fn open<'a>(mut input: Input<'a>, options: &ReadOptions) -> Result<(L
     while let Some(tag) = next_tag(&mut input)? {
         match tag.name.as_str() {
             "VTKFile" => document.file(&tag)?,
+            "/VTKFile" => document.complete = true,
             "ImageData" => document.image(&tag)?,
             "Piece" => document.piece(&tag)?,
             "PointData" | "CellData" => {
@@ -46,7 +47,10 @@ pub(super) fn open<'a>(mut input: Input<'a>, options: &ReadOptions) -> Result<(L
                 }
                 document.chosen = Some(array);
             }
-            "AppendedData" => return document.appended(&tag, input, options),
+            "AppendedData" => {
+                document.complete = true;
+                return document.appended(&tag, input, options);
+            }
             _ => {}
         }
     }
@@ -115,6 +119,8 @@ struct Document {
     origin: [f64; 3],
     aligned: bool,
     pieces: u32,
+    /// All tags that can describe an array were seen.
+    complete: bool,
     names: Vec<String>,
     chosen: Option<Array>,
 }
@@ -268,7 +274,7 @@ impl Document {
     fn nothing(&self, options: &ReadOptions, position: u64) -> Error {
         match &options.array {
             _ if self.header.is_none() => invalid("document", "an element VTKFile", "none"),
-            _ if self.chosen.is_some() => {
+            _ if self.chosen.is_some() || !self.complete => {
                 Error::TooShort { expected: position + 1, found: position }
             }
             Some(wanted) => {

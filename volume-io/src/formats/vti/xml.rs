@@ -34,10 +34,14 @@ impl Tag {
                 break;
             }
             let (key, value) = rest.split_once('=')?;
+            let key = key.trim_end();
+            if key.is_empty() || key.contains(|c: char| c.is_ascii_whitespace()) {
+                return None;
+            }
             let value = value.trim_start();
             let quote = value.chars().next().filter(|c| matches!(c, '"' | '\''))?;
             let (value, after) = value.get(1..)?.split_once(quote)?;
-            attributes.push((key.trim_end().into(), unescape(value)));
+            attributes.push((key.into(), unescape(value)));
             rest = after;
         }
         (!name.is_empty()).then(|| Self { name: name.into(), attributes })
@@ -146,7 +150,9 @@ mod tests {
 
     #[test]
     fn broken_tags_are_refused() {
-        for text in ["<a b>", "<a b=1>", "<a b='1>", "<>", "<a", "<!-- ", "< a>"] {
+        for text in
+            ["<a b>", "<a b=1>", "<a b='1>", "<a b c='1'>", "<a ='1'>", "<>", "<a", "<!-- ", "< a>"]
+        {
             let error = next_tag(&mut Input::from_bytes("x", text.as_bytes())).unwrap_err();
             let expected = matches!(error, Error::InvalidHeader { .. } | Error::TooShort { .. });
             assert!(expected, "{text}: {error}");
