@@ -354,3 +354,28 @@ fn helps_and_lists_adapters() {
     assert!(succeed(&["info", "--help"]).contains("Usage: render info"));
     assert!(!succeed(&["--list-adapters"]).trim().is_empty());
 }
+
+#[test]
+fn both_strategies_write_the_same_picture() {
+    let folder = folder("strategies");
+    let settings: [&[&str]; 4] = [
+        &["--strategy", "run-ahead", "--look-ahead", "3"],
+        &["--strategy", "block-sorted"],
+        &["--strategy", "block-sorted", "--start-factor", "4"],
+        &["--strategy", "block-sorted", "--no-speculation"],
+    ];
+    let pictures = settings.iter().enumerate().map(|(i, setting)| {
+        let file = path(&folder, &format!("{i}.png"));
+        let mut arguments = vec!["--volume", "gyroid:24x24x24", "--size", "48x32"];
+        arguments.extend_from_slice(setting);
+        arguments.extend_from_slice(&["--color", &file]);
+        succeed(&arguments);
+        image::open(&file).unwrap().into_rgba8()
+    });
+    let pictures: Vec<_> = pictures.collect();
+    assert!(pictures[0].pixels().any(|p| p != pictures[0].get_pixel(0, 0)), "the picture is empty");
+    assert!(pictures.iter().all(|picture| *picture == pictures[0]));
+    refuse(&["--volume", "brain", "--start-factor", "2"], &["--start-factor", "run-ahead"]);
+    let ahead = ["--volume", "brain", "--strategy", "block-sorted", "--look-ahead", "2"];
+    refuse(&ahead, &["--look-ahead", "block-sorted"]);
+}

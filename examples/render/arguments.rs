@@ -3,7 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use progressive_iso::{BlockSortedOptions, TraversalStrategy};
 use volume_io::SampleType;
+
+use crate::problem::Problem;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -54,11 +57,18 @@ pub struct Arguments {
     /// How rays are taken through the volume
     #[arg(long, value_enum, default_value_t = Strategy::RunAhead)]
     pub strategy: Strategy,
+    /// BlockSorted: ray-block pairs per pixel
+    #[arg(long, value_name = "S", default_value_t = 1,
+        value_parser = clap::value_parser!(u32).range(1..=8))]
+    pub start_factor: u32,
+    /// BlockSorted: every ray goes one block at a time
+    #[arg(long)]
+    pub no_speculation: bool,
     /// Rounds of walking and decoding per submission
     #[arg(long, value_name = "N", default_value_t = 1,
         value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub rounds_per_pass: u32,
-    /// Active blocks that a ray requests when it stops, the missing one included; more need fewer
+    /// RunAhead: active blocks that a ray requests when it stops, the missing one included; more need fewer
     /// passes and decode more
     #[arg(long, value_name = "N", default_value_t = 1,
         value_parser = clap::value_parser!(u32).range(1..=1024))]
@@ -95,6 +105,27 @@ pub enum Command {
 pub enum Strategy {
     /// A ray walks through what is resident and stops at the first missing block
     RunAhead,
+    /// The published algorithm: rays are grouped by block and go ahead speculatively
+    BlockSorted,
+}
+
+impl Arguments {
+    /// The strategy with its options, or what contradicts it.
+    pub fn traversal(&self) -> Result<TraversalStrategy, Problem> {
+        let refuse = |option: &str, strategy: &str| {
+            Err(Problem::input(format!("{option} has no meaning with --strategy {strategy}")))
+        };
+        match self.strategy {
+            Strategy::RunAhead if self.start_factor != 1 => refuse("--start-factor", "run-ahead"),
+            Strategy::RunAhead if self.no_speculation => refuse("--no-speculation", "run-ahead"),
+            Strategy::RunAhead => Ok(TraversalStrategy::RunAhead),
+            Strategy::BlockSorted if self.look_ahead != 1 => refuse("--look-ahead", "block-sorted"),
+            Strategy::BlockSorted => Ok(TraversalStrategy::BlockSorted(BlockSortedOptions {
+                start_factor: self.start_factor,
+                speculation: !self.no_speculation,
+            })),
+        }
+    }
 }
 
 /// How to read the volume.

@@ -15,13 +15,13 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Instant;
 
-use arguments::{Arguments, CameraOptions, Command, Strategy};
+use arguments::{Arguments, CameraOptions, Command};
 use clap::Parser;
 use input::Input;
 use problem::Problem;
 use progressive_iso::{
     Camera, Capture, CompressedVolume, Frame, FrameOptions, Outputs, ProgressiveIsoRenderer,
-    RendererOptions, Shading, TraversalStrategy, wgpu,
+    RendererOptions, Shading, wgpu,
 };
 use support::{Gpu, PassEntry, Report};
 
@@ -68,6 +68,7 @@ fn render(arguments: &Arguments, volume: &str) -> Result<(), Problem> {
     for path in files.into_iter().flatten() {
         check_folder(path)?;
     }
+    let strategy = arguments.traversal()?;
     let input = Input::read(volume, &arguments.input)?;
     print!("{}", input.describe());
     let isovalue = arguments.iso.unwrap_or_else(|| input.suggested_isovalue());
@@ -84,9 +85,7 @@ fn render(arguments: &Arguments, volume: &str) -> Result<(), Problem> {
         budget_bytes: arguments.scene.budget << 20,
         outputs: Outputs { depth: arguments.depth.is_some(), ..Default::default() },
         capture,
-        strategy: match arguments.strategy {
-            Strategy::RunAhead => TraversalStrategy::RunAhead,
-        },
+        strategy,
         ..Default::default()
     };
     let begin = Instant::now();
