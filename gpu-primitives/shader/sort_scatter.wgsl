@@ -13,11 +13,12 @@
 
 const SORT_HALF: u32 = SORT_DIGITS / 2u;
 
-// Per digit and lane: occurrences of the digit in the lane's keys, then the workgroup's pairs that
-// come before them in sorted order. Two digits to a word, those of the upper half in the high 16
-// bits: a workgroup has fewer than 65536 pairs. Starts as zeros, as all workgroup memory.
+// Per digit and lane: occurrences of the digit in the lane's keys, then their sums over the digits
+// and lanes before, of which only differences within a digit matter. Two digits to a word, those of
+// the upper half in the high 16 bits: a workgroup has fewer than 65536 pairs. Starts as zeros, as
+// all workgroup memory.
 var<workgroup> sort_ranks: array<u32, SORT_HALF * SCAN_LANES>;
-// What to add to a rank within the workgroup, per digit.
+// What to add to such a sum for a place among all pairs, per digit.
 var<workgroup> sort_starts: array<u32, SORT_DIGITS>;
 
 fn sort_word(digit: u32, lane: u32) -> u32 {
@@ -40,8 +41,7 @@ fn sort_sum_ranks(lane: u32) {
         own += sort_ranks[first + i];
     }
     let sum = scan_group(lane, own);
-    // The digits of the upper half come after all of the lower half.
-    var before = sum.before + (sum.total << 16u);
+    var before = sum.before;
     for (var i = 0u; i < SORT_HALF; i++) {
         let word = sort_ranks[first + i];
         sort_ranks[first + i] = before;

@@ -23,6 +23,8 @@ pub(crate) struct Grouping {
 
 impl Grouping {
     pub(crate) const DEFAULT: Grouping = Grouping { log_items: 2 };
+    /// For the sort, where a group's work on its digits costs as much as that of many pairs.
+    pub(crate) const SORT: Grouping = Grouping { log_items: 3 };
     /// The smallest groups: most levels and workgroups for a given number of elements.
     #[cfg(test)]
     pub(crate) const FINEST: Grouping = Grouping { log_items: 0 };

@@ -51,7 +51,7 @@ impl SortPlan {
         let max_count = u32::try_from(max_count).unwrap_or(u32::MAX);
         let groups = grouping.groups(max_count).max(1);
         // At most 2^24 groups.
-        let scan = ScanPlan::new(grouping, u64::from(DIGITS * groups), 0);
+        let scan = ScanPlan::new(Grouping::DEFAULT, u64::from(DIGITS * groups), 0);
         Self { max_count, key_bits: key_bits.min(KEY_BITS), groups, scan }
     }
 
@@ -104,18 +104,18 @@ impl SortPlan {
 
 impl Sort {
     /// Pairs that one workgroup moves.
-    pub const PAIRS_PER_GROUP: u32 = 1 << Grouping::DEFAULT.log_group();
+    pub const PAIRS_PER_GROUP: u32 = 1 << Grouping::SORT.log_group();
 
     /// Makes the pipelines.
     #[must_use]
     pub fn new(device: &wgpu::Device) -> Self {
-        Self::with_grouping(device, Grouping::DEFAULT)
+        Self::with_grouping(device, Grouping::SORT)
     }
 
     fn with_grouping(device: &wgpu::Device, grouping: Grouping) -> Self {
         let [args, count, scatter] =
             Self::grouped_sources(grouping).map(|source| source.kernel(device));
-        Self { args, count, scatter, scan: Scan::with_grouping(device, grouping) }
+        Self { args, count, scatter, scan: Scan::new(device) }
     }
 
     /// Costs of a sort of up to `max_count` pairs by the lowest `key_bits` bits of their keys.
@@ -124,13 +124,13 @@ impl Sort {
     /// 32 the number of bits.
     #[must_use]
     pub fn plan(max_count: u64, key_bits: u32) -> SortPlan {
-        SortPlan::new(Grouping::DEFAULT, max_count, key_bits)
+        SortPlan::new(Grouping::SORT, max_count, key_bits)
     }
 
     /// Texts and bindings of the kernels (those of [`Scan`] not included).
     #[must_use]
     pub fn sources() -> [KernelSource; 3] {
-        Self::grouped_sources(Grouping::DEFAULT)
+        Self::grouped_sources(Grouping::SORT)
     }
 
     fn grouped_sources(grouping: Grouping) -> [KernelSource; 3] {
@@ -300,12 +300,7 @@ impl SortBuffers {
     }
 }
 
-fn pass_params(
-    device: &wgpu::Device,
-    ledger: &Ledger,
-    plan: &SortPlan,
-    count_word: u32,
-) -> Buffer {
+fn pass_params(device: &wgpu::Device, ledger: &Ledger, plan: &SortPlan, count_word: u32) -> Buffer {
     let mut bytes = Vec::new();
     for pass in 0..plan.passes() {
         bytes.resize(OFFSET_ALIGNMENT as usize * pass as usize, 0);
@@ -329,12 +324,13 @@ mod tests {
     use super::*;
     use gpu_testkit::gpu;
 
-    // 65537 groups of 256, so the dispatches fold; the counts of digits take four levels.
+    // 65537 groups of 256, so the dispatches fold; the counts of digits take three levels.
     #[test]
+    #[ignore = "takes minutes on SwiftShader; cargo test -p gpu-primitives -- --ignored"]
     fn more_groups_than_one_dimension_takes() {
         const COUNT: u32 = 65_536 * 256 + 1;
         let (device, queue) = gpu::device();
-        let keys: Vec<u32> = (0..COUNT).map(|i| i.wrapping_mul(2_654_435_761) >> 24).collect();
+        let keys: Vec<u32> = (0..COUNT).map(|i| i.wrapping_mul(2_654_435_761) >> 28).collect();
         let values: Vec<u32> = (0..COUNT).map(|i| i ^ 0x5555_5555).collect();
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
         let buffer = |words: &[u32]| gpu::buffer_with(&device, bytemuck::cast_slice(words), usage);
@@ -343,8 +339,8 @@ mod tests {
 
         let ledger = Ledger::new();
         let sort = Sort::with_grouping(&device, Grouping::FINEST);
-        let plan = SortPlan::new(Grouping::FINEST, u64::from(COUNT), 8);
-        assert_eq!((plan.passes(), plan.groups), (2, 65_537));
+        let plan = SortPlan::new(Grouping::FINEST, u64::from(COUNT), 4);
+        assert_eq!((plan.passes(), plan.groups), (1, 65_537));
         let buffers = SortBuffers::new(
             &device,
             &ledger,
@@ -359,7 +355,7 @@ mod tests {
         sort.record(&mut encoder, &buffers);
         gpu::submit_and_wait(&device, &queue, encoder);
 
-        let (expected_keys, expected_values) = crate::cpu::sort::sort(&keys, &values, 8);
+        let (expected_keys, expected_values) = crate::cpu::sort::sort(&keys, &values, 4);
         for (found, expected) in
             [(buffers.keys(), expected_keys), (buffers.values(), expected_values)]
         {
@@ -373,7 +369,7 @@ mod tests {
     #[test]
     fn digits_cover_the_key_bits() {
         let digits = |bits| {
-            let plan = SortPlan::new(Grouping::DEFAULT, 1, bits);
+            let plan = SortPlan::new(Grouping::SORT, 1, bits);
             (0..plan.passes()).map(|pass| plan.digit(pass)).collect::<Vec<_>>()
         };
         assert_eq!(digits(0), [[0, 0]]);

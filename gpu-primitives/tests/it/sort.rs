@@ -102,7 +102,7 @@ fn all_equal_sorted_and_reversed() {
     check(&(0..length).collect::<Vec<_>>(), length, 14);
     check(&(0..length).rev().collect::<Vec<_>>(), length, 14);
     // Runs longer and shorter than a group.
-    check(&(0..length).map(|i| 7 - i / 500).collect::<Vec<_>>(), length, 3);
+    check(&(0..length).map(|i| 7 - i / 2500).collect::<Vec<_>>(), length, 3);
     check(&(0..length).map(|i| i / 3 % 16).collect::<Vec<_>>(), length, 4);
 }
 
