@@ -97,7 +97,6 @@ fn walk(ray: DdaRay, first_block: vec3<i32>, leads: bool) -> u32 {
         }
         place = result.place;
     }
-    return RAY_DONE;
 }
 
 @compute @workgroup_size(64)

@@ -16,10 +16,6 @@ fn kind(binding: &Binding) -> BindingKind {
 
 fn check(source: &KernelSource) {
     let text = &source.wgsl.source;
-    if let Ok(folder) = std::env::var("DUMP_WGSL") {
-        std::fs::write(format!("{folder}/{}.wgsl", source.label), text)
-            .expect("the folder can be written");
-    }
     layout::validate_wgsl(text).unwrap_or_else(|e| panic!("{}: {e}", source.label));
     let kinds: Vec<BindingKind> = source.bindings.iter().map(kind).collect();
     layout::check_bindings(text, source.entry_point, &kinds)
