@@ -26,9 +26,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let frames = arguments.frames.unwrap_or(FRAMES);
     let mut before = None;
     for frame in 0..frames {
-        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
-            label: Some("host.frame"),
-        });
+        let mut encoder = gpu
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("host.frame") });
         let degrees = orbit_degrees(frame);
         let report = scene.record(&gpu, &mut encoder, &view, degrees)?;
         let submission = gpu.queue.submit([encoder.finish()]);
@@ -40,10 +40,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         }
         // A window's display would hold the loop back; here, the frame before must be done.
         if let Some(submission) = before.replace(submission) {
-            gpu.device.poll(wgpu::PollType::Wait {
-                submission_index: Some(submission),
-                timeout: None,
-            })?;
+            gpu.device
+                .poll(wgpu::PollType::Wait { submission_index: Some(submission), timeout: None })?;
         }
     }
     println!("pictures are in {}", arguments.out.display());
@@ -72,9 +70,9 @@ fn write_picture(gpu: &Gpu, color: &wgpu::Texture, path: &Path) -> Result<(), Fa
         usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
         mapped_at_creation: false,
     });
-    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
-        label: Some("host.picture"),
-    });
+    let mut encoder = gpu
+        .device
+        .create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("host.picture") });
     let layout = wgpu::TexelCopyBufferLayout {
         offset: 0,
         bytes_per_row: Some(width * 4),

@@ -51,12 +51,8 @@ impl Scene {
         };
         let volume = CompressedVolume::try_from(&volumes::brain())?;
         let (center, radius) = volume.bounding_ball();
-        let options = RendererOptions {
-            size,
-            budget_bytes,
-            draw_target: Some(target),
-            ..Default::default()
-        };
+        let options =
+            RendererOptions { size, budget_bytes, draw_target: Some(target), ..Default::default() };
         let renderer = ProgressiveIsoRenderer::new(&gpu.device, &gpu.queue, volume, options)?;
 
         let link = [0.0, 0.28, 0.12].map(|share| share * radius as f32);

@@ -128,9 +128,10 @@ impl Shown {
             _ => return Ok(()), // Hidden or late: the next redraw tries again.
         };
         let view = target.texture.create_view(&wgpu::TextureViewDescriptor::default());
-        let mut encoder = self.gpu.device.create_command_encoder(
-            &wgpu::CommandEncoderDescriptor { label: Some("host.frame") },
-        );
+        let mut encoder = self
+            .gpu
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("host.frame") });
         self.scene.record(&self.gpu, &mut encoder, &view, orbit_degrees(self.frame))?;
         self.gpu.queue.submit([encoder.finish()]);
         self.window.pre_present_notify();
