@@ -1,9 +1,10 @@
-//! Set-up, tests and demo in one command each: `cargo xtask demo|test|msrv|adapter`.
+//! Set-up, tests, demo and checks in one command each: `cargo xtask` lists them.
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a command-line program")]
 
 mod adapter;
 mod msrv;
 mod process;
+mod published;
 
 use std::process::ExitCode;
 
@@ -17,6 +18,10 @@ usage: cargo xtask COMMAND
   test [ARGUMENTS]  make sure that there is a GPU adapter, then run every test, on SwiftShader too
                     where it is found (further arguments go to both runs of cargo test)
   msrv              check that no dependency of a published crate needs a newer Rust
+  features          check that every published crate compiles with each of its features alone
+  outside           build a program outside the workspace that uses the published crate
+  package [ARGUMENTS]
+                    make the archives of all published crates (further arguments go to cargo)
   adapter           print the GPU adapter that demo and test use
 
 The environment variable PROGRESSIVE_ISO_ADAPTER selects an adapter by a part of its name.";
@@ -29,6 +34,9 @@ fn main() -> ExitCode {
         ("demo", _) => demo(&rest),
         ("test", _) => test(&rest),
         ("msrv", []) => msrv::check(),
+        ("features", []) => published::check_features(),
+        ("outside", []) => published::build_outside(),
+        ("package", _) => published::package(&rest),
         ("adapter", []) => adapter::describe().map(|description| println!("{description}")),
         _ => {
             eprintln!("{USAGE}");
