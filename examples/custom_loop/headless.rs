@@ -33,7 +33,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         let report = scene.record(&gpu, &mut encoder, &view, degrees)?;
         let submission = gpu.queue.submit([encoder.finish()]);
 
-        let (loaded, rays) = (report.loaded * 100.0, report.active_rays);
+        let loaded = report.loaded * 100.0;
+        let rays = if report.pass > 0 { report.active_rays.to_string() } else { "-".into() };
         println!("{frame:5} {degrees:8.1} {loaded:6.0}% {rays:16} {:8}", report.complete());
         if frame % arguments.every == 0 || frame + 1 == frames {
             write_picture(&gpu, &color, &arguments.out.join(format!("frame_{frame:03}.png")))?;
