@@ -77,12 +77,9 @@ fn request_ahead(ray: DdaRay, start: MacrocellPlace, leads: bool) {
 fn walk(ray: DdaRay, first_block: vec3<i32>, leads: bool) -> u32 {
     let first_box = dda_box(first_block * 4, 2u, frame.grid.last_cell);
     let entry = dda_entry(ray, first_box);
-    var place = MacrocellPlace(entry, dda_cell_after(ray, entry, first_box));
-    loop {
-        place = macrocell_advance(frame.grid, ray, place);
-        if (!macrocell_inside(frame.grid, place.cell)) {
-            return RAY_DONE;
-        }
+    let start = MacrocellPlace(entry, dda_cell_after(ray, entry, first_box));
+    var place = macrocell_advance(frame.grid, ray, start);
+    while (macrocell_inside(frame.grid, place.cell)) {
         let block = place.cell >> vec3<u32>(2u);
         let state = macrocell_linear(block, frame.grid.blocks);
         block_open(block);
@@ -95,8 +92,9 @@ fn walk(ray: DdaRay, first_block: vec3<i32>, leads: bool) -> u32 {
             request_ahead(ray, place, leads);
             return RAY_ACTIVE | state;
         }
-        place = result.place;
+        place = macrocell_advance(frame.grid, ray, result.place);
     }
+    return RAY_DONE;
 }
 
 @compute @workgroup_size(64)
