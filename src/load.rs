@@ -30,6 +30,11 @@ impl LoadPlan {
         Self { chunk: useful.min(rounded_down) }
     }
 
+    /// The smallest chunks.
+    pub(crate) fn smallest(stream_bytes: u64) -> Self {
+        Self::new(stream_bytes, 0)
+    }
+
     /// Two passes are in flight, and a chunk may be split at a page's border.
     pub(crate) fn staging_bytes(self) -> u64 {
         4 * self.chunk

@@ -63,15 +63,25 @@ impl ScenePlan {
         let macrocell = MacrocellPlan::new(volume.dims(), limits)?;
         let outputs = options.all_outputs();
         let wavefront = WavefrontPlan::new(options.size, outputs, limits)?;
-        let load = LoadPlan::new(payload.layout().stream_bytes(), options.budget_bytes);
-        let mut parts = fixed_parts(options, &payload, &macrocell, &load, &wavefront);
-        let fixed: u64 = parts.iter().map(|part| part.bytes).sum();
+        let budget_bytes = options.budget_bytes;
         let blocks = macrocell.grid().block_count();
         let strategy = StrategyPlan::new(options.strategy, wavefront.rays(), limits)?;
-        let minimum = fixed
-            + CachePlan::minimum_bytes(blocks)
-            + strategy.bytes(CachePlan::least_slots(blocks));
-        let budget_bytes = options.budget_bytes;
+        let smallest_cache =
+            CachePlan::minimum_bytes(blocks) + strategy.bytes(CachePlan::least_slots(blocks));
+        let parts_with = |load: &LoadPlan| {
+            let parts = fixed_parts(options, &payload, &macrocell, load, &wavefront);
+            let bytes: u64 = parts.iter().map(|part| part.bytes).sum();
+            (parts, bytes)
+        };
+        let stream_bytes = payload.layout().stream_bytes();
+        let mut load = LoadPlan::new(stream_bytes, budget_bytes);
+        let (mut parts, mut fixed) = parts_with(&load);
+        if fixed + smallest_cache > budget_bytes {
+            // Staging grows with the budget, the minimum must not.
+            load = LoadPlan::smallest(stream_bytes);
+            (parts, fixed) = parts_with(&load);
+        }
+        let minimum = fixed + smallest_cache;
         if minimum > budget_bytes {
             return Err(Error::BudgetTooSmall { minimum, budget: budget_bytes });
         }

@@ -64,7 +64,7 @@ impl Camera {
 
     /// A perspective camera on a sphere about `center`: azimuth and elevation in degrees, +y up;
     /// (0, 0) looks along -z. The distance is such that a ball of `radius` fills the frame's
-    /// smaller side; near and far enclose it.
+    /// smaller side; near and far enclose it. A radius of 0, that of a volume of one voxel, counts as 1.
     #[must_use]
     pub fn orbit(
         center: [f64; 3],
@@ -74,6 +74,7 @@ impl Camera {
         vertical_fov_degrees: f64,
         aspect: f64,
     ) -> Self {
+        let radius = if radius == 0.0 { 1.0 } else { radius };
         let half = (vertical_fov_degrees.to_radians() / 2.0).min(1.5);
         let half = half.min((half.tan() * aspect).atan());
         let distance = radius / half.sin();
