@@ -135,8 +135,10 @@ impl<'a> Expected<'a> {
             let side = |sign| reach(&self.scene, ray, hit.t, sign, allowed);
             (hit.t, slack, allowed, [side(-1.0), side(1.0)])
         });
-        let grazes_box = trace.silhouette_distance.abs()
-            <= error.position(500.0).iter().fold(0.0, |a, b| b.max(a));
+        let diagonal = self.dims.map(f64::from).iter().map(|n| n * n).sum::<f64>().sqrt();
+        let farthest = error.position(2.0 * diagonal);
+        let grazes_box =
+            trace.silhouette_distance.abs() <= farthest.into_iter().fold(0.0, f64::max);
         let may_miss = grazes_box || truth.is_some_and(|t| trace.turning_margin <= t.2);
         summary.ambiguous += usize::from(may_miss);
         match found.status {
@@ -154,10 +156,10 @@ impl<'a> Expected<'a> {
             PixelStatus::Hit => {
                 summary.hits += 1;
                 let t = (f64::from(found.depth) - self.view.start_depth()) / depth_per_voxel;
-                if !(t >= -1e-3 && t.is_finite()) {
+                let slack = parameter_error(&self.view, depth_per_voxel, t.max(0.0));
+                if !(t >= -slack && t.is_finite()) {
                     return Err(format!("a hit at t = {t}, before the ray's start"));
                 }
-                let slack = parameter_error(&self.view, depth_per_voxel, t);
                 let position_error = error.position(t);
                 self.check_residual(ray, t, slack, position_error, summary)?;
                 match truth {

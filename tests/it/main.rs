@@ -5,6 +5,9 @@
 #![allow(clippy::unwrap_used, reason = "a failed set-up fails the test")]
 
 mod bounds;
+mod budget;
 mod compare;
+mod errors;
+mod invariance;
 mod reference;
 mod support;
