@@ -4,8 +4,11 @@
 use std::sync::OnceLock;
 
 use gpu_testkit::compare::bits_equal;
+#[cfg(feature = "block-sorted")]
+use progressive_iso::BlockSortedOptions;
 use progressive_iso::{
-    Capture, Error, Frame, PixelStatus, ProgressiveIsoRenderer, RendererOptions, ScenePlan, wgpu,
+    Capture, Error, Frame, PixelStatus, ProgressiveIsoRenderer, RendererOptions, ScenePlan,
+    TraversalStrategy, wgpu,
 };
 use proptest::prelude::*;
 
@@ -104,6 +107,7 @@ fn history() -> impl Strategy<Value = Vec<Before>> {
 struct Case {
     scene: usize,
     shot: Shot,
+    strategy: TraversalStrategy,
     /// Share of the way from the smallest budget to one that holds every block.
     budget: f64,
     rounds_per_pass: u32,
@@ -113,12 +117,26 @@ struct Case {
     stop_after: u32,
 }
 
+#[cfg(not(feature = "block-sorted"))]
+fn strategies() -> impl Strategy<Value = TraversalStrategy> {
+    Just(TraversalStrategy::RunAhead)
+}
+
+#[cfg(feature = "block-sorted")]
+fn strategies() -> impl Strategy<Value = TraversalStrategy> {
+    let sorted = (1..9u32, any::<bool>()).prop_map(|(start_factor, speculation)| {
+        TraversalStrategy::BlockSorted(BlockSortedOptions { start_factor, speculation })
+    });
+    prop_oneof![2 => Just(TraversalStrategy::RunAhead), 1 => sorted]
+}
+
 fn cases() -> impl Strategy<Value = Case> {
     let budget = prop_oneof![2 => Just(0.0), 1 => Just(1.0), 3 => 0.03..0.6];
-    (0..3usize, shots(), budget, 1..5u32, 1..6u32, history(), 0..9u32).prop_map(
-        |(scene, shot, budget, rounds_per_pass, look_ahead, history, stop_after)| Case {
+    (0..3usize, shots(), strategies(), budget, 1..5u32, 1..6u32, history(), 0..9u32).prop_map(
+        |(scene, shot, strategy, budget, rounds_per_pass, look_ahead, history, stop_after)| Case {
             scene,
             shot,
+            strategy,
             budget,
             rounds_per_pass,
             look_ahead,
@@ -164,10 +182,12 @@ fn check(gpu: &Gpu, case: &Case) -> Result<(), String> {
     let size = if case.budget == 0.0 { SMALL } else { SIZE };
     let mut frame = case.shot.frame(scene, size);
     let expected = gpu.render(scene, options(size), &frame);
-    let least = minimum_budget(scene, &options(size));
-    let most = gpu.renderer(scene, options(size)).plan().bytes();
-    let budget_bytes = least + (case.budget * most.saturating_sub(least) as f64) as u64;
-    let mut renderer = gpu.renderer(scene, RendererOptions { budget_bytes, ..options(size) });
+    let choice = RendererOptions { strategy: case.strategy, ..options(size) };
+    let least = minimum_budget(scene, &choice);
+    let whole = ScenePlan::new(&scene.compressed(), &choice, &wgpu::Limits::default()).unwrap();
+    let more = whole.bytes().saturating_sub(least) as f64;
+    let budget_bytes = least + (case.budget * more) as u64;
+    let mut renderer = gpu.renderer(scene, RendererOptions { budget_bytes, ..choice });
     if case.budget == 0.0 && renderer.plan().slots() > 64 {
         return Err(format!("{} slots at the least budget", renderer.plan().slots()));
     }
