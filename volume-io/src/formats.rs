@@ -10,15 +10,17 @@ mod raw;
 mod vti;
 mod zfp;
 
+use std::io::Write;
 use std::sync::Arc;
 
-use crate::convert::Converter;
+use crate::convert::{Converter, Progress};
 use crate::encode::{Encoded, Encoder};
 use crate::error::{Error, Result};
 use crate::input::Input;
 use crate::layout::Layout;
 use crate::options::{Headerless, ReadOptions};
 use crate::sink::Sink;
+use crate::stream::{Conversion, StreamEncoder};
 use crate::volume::ZfpVolume;
 
 pub(crate) use zfp::header_words;
@@ -51,22 +53,44 @@ pub fn read_file(path: impl AsRef<std::path::Path>, options: &ReadOptions) -> Re
 #[cfg(not(all(target_arch = "wasm32", target_os = "unknown")))]
 pub fn convert_file(
     path: impl AsRef<std::path::Path>,
-    writer: impl std::io::Write,
+    writer: impl Write,
     options: &ReadOptions,
     mut progress: impl FnMut(u64, u64),
-) -> Result<crate::Conversion> {
-    use crate::stream::{Conversion, StreamEncoder};
-    match open(open_path(path.as_ref())?, options)? {
+) -> Result<Conversion> {
+    convert(open_path(path.as_ref())?, writer, options, &mut progress)
+}
+
+/// As `convert_file`, for the contents of a file; `name` as in [`read_bytes`].
+///
+/// # Errors
+/// As [`read_bytes`], and [`Error::Io`] from the writer. What was written then is incomplete.
+pub fn convert_bytes(
+    name: &str,
+    bytes: &[u8],
+    writer: impl Write,
+    options: &ReadOptions,
+    mut progress: impl FnMut(u64, u64),
+) -> Result<Conversion> {
+    convert(Input::from_bytes(name, bytes), writer, options, &mut progress)
+}
+
+fn convert(
+    input: Input<'_>,
+    writer: impl Write,
+    options: &ReadOptions,
+    progress: Progress<'_>,
+) -> Result<Conversion> {
+    match open(input, options)? {
         Opened::Samples(layout, input) => {
             input.check_length(layout.end)?;
             let encoder = StreamEncoder::new(layout.dims, options.rate, writer)?.into_inner();
-            let converter = Converter::new(encoder, options, Some(&mut progress))?;
+            let converter = Converter::new(encoder, options, Some(progress))?;
             Conversion::finish(run(&layout, input, converter)?)
         }
-        Opened::Zfp(input) => zfp::convert(load_zfp(input)?, writer, options, &mut progress),
+        Opened::Zfp(input) => zfp::convert(load_zfp(input)?, writer, options, progress),
         Opened::Headerless(layout, input) => {
             let bytes = input.load(u64::MAX)?;
-            zfp::convert_headerless(bytes, &layout, writer, options, &mut progress)
+            zfp::convert_headerless(bytes, &layout, writer, options, progress)
         }
     }
 }

@@ -13,6 +13,10 @@ pub(crate) struct Input<'a> {
     /// Name of the file without folder and `.gz`, whose parts may say what it holds.
     pub(crate) file_name: String,
     /// Where the other files of a set lie, if they may be opened.
+    #[cfg_attr(
+        all(target_arch = "wasm32", target_os = "unknown"),
+        allow(dead_code, reason = "there are no files")
+    )]
     pub(crate) folder: Option<PathBuf>,
     /// Bytes in all, where that is known.
     pub(crate) length: Option<u64>,
@@ -80,6 +84,7 @@ impl<'a> Input<'a> {
     }
 
     /// What `decode` makes of the rest of this file.
+    #[cfg(any(feature = "gzip", feature = "vti"))]
     pub(crate) fn decoded<R: BufRead + 'a>(
         self,
         what: &str,

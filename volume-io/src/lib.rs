@@ -35,9 +35,9 @@ mod write;
 
 pub use encode::{BlockEncoder, encode};
 pub use error::{Error, Result};
+pub use formats::{convert_bytes, read_bytes, write_zfp};
 #[cfg(not(all(target_arch = "wasm32", target_os = "unknown")))]
 pub use formats::{convert_file, read_file};
-pub use formats::{read_bytes, write_zfp};
 pub use grid::{MAX_DIM, bits_per_block, pad_block};
 pub use options::{Headerless, RawLayout, ReadOptions};
 pub use source::{Distortion, Format, Note, SampleType, Source};

@@ -12,9 +12,10 @@ pub(crate) trait Sink {
     fn write(&mut self, word: [u8; 8]) -> Result<()>;
 }
 
-/// Bytes of a piece of a stream that may turn out shorter than announced. Large enough for
-/// allocators to give each back to the system when it is freed.
-const PIECE_BYTES: u64 = 64 << 20;
+/// Bytes of the pieces of a stream that may turn out shorter than announced: every piece is as long
+/// as all before it, within these bounds. The upper one is large enough for allocators to give
+/// each piece back to the system when it is freed.
+const PIECE_BYTES: [u64; 2] = [1 << 16, 64 << 20];
 
 /// Zeros in a shared slice.
 pub(crate) fn zeros(bytes: u64) -> Result<Arc<[u8]>> {
@@ -34,18 +35,20 @@ fn check_allocation(bytes: u64) -> Result<usize> {
 #[derive(Debug)]
 pub(crate) struct Memory {
     pieces: Vec<Arc<[u8]>>,
-    /// Bytes per piece and of the whole stream; multiples of 8.
-    piece: u64,
+    /// Least and most bytes of a piece; multiples of 8, as is the total.
+    bounds: [u64; 2],
     total: u64,
     /// Bytes allocated, and bytes written.
     capacity: u64,
     length: u64,
+    /// Where the next word goes: the piece and the place in it.
+    next: [usize; 2],
 }
 
 impl Memory {
     pub(crate) fn new(total: u64, whole: bool) -> Self {
-        let piece = if whole { total } else { total.min(PIECE_BYTES) };
-        Self { pieces: Vec::new(), piece, total, capacity: 0, length: 0 }
+        let bounds = if whole { [total; 2] } else { PIECE_BYTES };
+        Self { pieces: Vec::new(), bounds, total, capacity: 0, length: 0, next: [0; 2] }
     }
 
     /// The stream. Pieces are freed while they are joined.
@@ -73,7 +76,8 @@ impl Memory {
 impl Sink for Memory {
     fn reserve(&mut self, more: u64) -> Result<()> {
         while self.capacity < self.total.min(self.length + more) {
-            let bytes = self.piece.min(self.total - self.capacity);
+            let [least, most] = self.bounds;
+            let bytes = self.capacity.clamp(least, most).min(self.total - self.capacity);
             self.pieces.push(zeros(bytes)?);
             self.capacity += bytes;
         }
@@ -82,13 +86,11 @@ impl Sink for Memory {
 
     fn write(&mut self, word: [u8; 8]) -> Result<()> {
         self.reserve(8)?;
-        let piece = self.piece.max(1);
-        let at = (self.length % piece) as usize;
-        let place = self
-            .pieces
-            .get_mut((self.length / piece) as usize)
-            .and_then(Arc::get_mut)
-            .and_then(|piece| piece.get_mut(at..at + 8));
+        let [piece, at] = self.next;
+        let current = self.pieces.get_mut(piece).and_then(Arc::get_mut).unwrap_or_default();
+        let rest = current.len().saturating_sub(at + 8);
+        self.next = if rest == 0 { [piece + 1, 0] } else { [piece, at + 8] };
+        let place = current.get_mut(at..at + 8);
         if let Some(place) = place {
             place.copy_from_slice(&word);
         }
@@ -138,16 +140,18 @@ mod tests {
 
     #[test]
     fn pieces_become_one_stream() {
-        for (piece, total) in [(24, 24), (24, 72), (16, 72), (8, 8), (64, 72)] {
+        for (bounds, total) in
+            [([24; 2], 24), ([24; 2], 72), ([8, 16], 72), ([8, 64], 80), ([8, 8], 8), ([64; 2], 72)]
+        {
             let mut memory = Memory::new(total, false);
-            memory.piece = piece;
+            memory.bounds = bounds;
             let words: Vec<u64> = (0..total / 8).map(|i| 0x0102_0304_0506_0708 * i).collect();
             for word in &words {
                 memory.write(word.to_le_bytes()).unwrap();
             }
             assert_eq!(memory.capacity, total);
             let expected: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
-            assert_eq!(memory.into_bytes().unwrap()[..], expected, "{piece} {total}");
+            assert_eq!(memory.into_bytes().unwrap()[..], expected, "{bounds:?} {total}");
         }
     }
 
@@ -161,7 +165,7 @@ mod tests {
 
         let mut growing = Memory::new(1 << 50, false);
         growing.reserve(1).unwrap();
-        assert_eq!(growing.capacity, PIECE_BYTES);
+        assert_eq!(growing.capacity, PIECE_BYTES[0]);
         let error = Memory::new(1 << 62, true).write([0; 8]).unwrap_err();
         assert!(matches!(error, Error::OutOfMemory { bytes } if bytes == 1 << 62), "{error}");
     }

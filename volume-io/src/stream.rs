@@ -92,7 +92,7 @@ impl<W: Write> StreamEncoder<W> {
     }
 }
 
-/// What was written by [`StreamEncoder`] or [`convert_file`](crate::convert_file).
+/// What was written by [`StreamEncoder`] or [`convert_bytes`](crate::convert_bytes).
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Conversion {

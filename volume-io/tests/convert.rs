@@ -6,12 +6,12 @@ mod common;
 
 use std::io::{self, Write};
 
-use common::{DIMS, ORIGIN, SPACING, data, options, path};
+use common::{data, options, path};
 use proptest::prelude::*;
 use volume_io::{
-    BlockEncoder, Error, Format, Headerless, Note, ReadOptions, SampleType, StreamEncoder,
-    ZfpVolume, convert_file, encode, raw_file_name, read_bytes, read_file, write_npy, write_nrrd,
-    write_raw, write_zfp,
+    BlockEncoder, Error, Format, Headerless, ReadOptions, StreamEncoder, ZfpVolume, convert_bytes,
+    convert_file, encode, raw_file_name, read_bytes, read_file, write_npy, write_nrrd, write_raw,
+    write_zfp,
 };
 
 fn convert(name: &str, options: &ReadOptions) -> (Vec<u8>, volume_io::Conversion) {
@@ -22,6 +22,11 @@ fn convert(name: &str, options: &ReadOptions) -> (Vec<u8>, volume_io::Conversion
     assert_eq!(conversion.bytes, bytes.len() as u64, "{name}");
     let total = conversion.dims.iter().map(|n| u64::from(n.div_ceil(4))).product();
     assert_eq!(calls.last(), Some(&(total, total)), "{name}");
+    let mut again = Vec::new();
+    if !name.ends_with("hdr") {
+        convert_bytes(name, &data(name), &mut again, options, |_, _| ()).unwrap();
+        assert_eq!(again, bytes, "{name}");
+    }
     assert!(calls.is_sorted() && calls.iter().all(|call| call.1 == total), "{name}: {calls:?}");
     (bytes, conversion)
 }
@@ -44,7 +49,7 @@ fn conversion_writes_what_reading_and_writing_would() {
         #[cfg(feature = "vti")]
         "vti/uint16.vti",
         #[cfg(feature = "gzip")]
-        "nrrd/detached_gzip.nhdr",
+        "nrrd/gzip.nrrd",
         #[cfg(all(feature = "nifti", feature = "gzip"))]
         "big_endian.nii.gz",
         #[cfg(feature = "nifti")]
@@ -96,6 +101,8 @@ fn fixed_rate_streams_are_kept_or_get_the_rate_asked_for() {
 #[cfg(feature = "nifti")]
 #[test]
 fn nifti_pairs_are_read_from_either_file() {
+    use common::{DIMS, ORIGIN, SPACING};
+    use volume_io::SampleType;
     let types = if cfg!(feature = "gzip") {
         &[("plain", SampleType::I16), ("zipped", SampleType::F32)][..]
     } else {
@@ -144,17 +151,14 @@ fn zfp_streams_may_be_compressed() {
     let options = ReadOptions { headerless, ..options() };
     let file = zipped(&data("headerless_4_3.zfp"));
     assert_eq!(read_bytes("x.zfp.gz", file, &options).unwrap().dims, [9, 7, 6]);
-    let error = read_bytes("x", zipped(&zipped(b"zfp")), &options_none()).unwrap_err();
+    let error = read_bytes("x", zipped(&zipped(b"zfp")), &ReadOptions::default()).unwrap_err();
     assert!(matches!(error, Error::UnknownFormat { .. }), "{error}");
+    use volume_io::Note;
     // A stream followed by far more than it can need.
     let long = [data("rate_4.zfp"), vec![0; 1 << 20]].concat();
-    let volume = read_bytes("x", zipped(&long), &options_none()).unwrap();
+    let volume = read_bytes("x", zipped(&long), &ReadOptions::default()).unwrap();
     assert!(volume.bytes.len() < 1000, "{}", volume.bytes.len());
     assert!(matches!(volume.source.notes[..], [Note::TrailingBytes(_)]));
-}
-
-fn options_none() -> ReadOptions {
-    ReadOptions::default()
 }
 
 /// Fails after some bytes.

@@ -4,8 +4,8 @@
 
 mod common;
 
-use common::{DIMS, assert_ramp, assert_samples, data, options, path, ramp, read};
-use volume_io::{Error, Format, RawLayout, ReadOptions, SampleType, read_bytes, read_file};
+use common::{DIMS, assert_ramp, assert_samples, data, options, ramp, read};
+use volume_io::{Error, Format, RawLayout, ReadOptions, SampleType, read_bytes};
 
 #[test]
 fn names_say_what_is_in_a_file() {
@@ -38,7 +38,7 @@ fn compressed_files_are_read_under_the_same_names() {
     assert_ramp(name, Format::Raw, SampleType::U16, false);
     let layout = |dims| {
         let raw = Some(RawLayout { dims, sample_type: SampleType::U16 });
-        read_file(path(name), &ReadOptions { raw, ..options() })
+        volume_io::read_file(common::path(name), &ReadOptions { raw, ..options() })
     };
     let error = layout([7, 5, 5]).unwrap_err();
     assert!(matches!(error, Error::RawLength { expected: 350, found: 420, .. }), "{error}");

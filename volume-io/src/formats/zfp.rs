@@ -36,7 +36,6 @@ pub(super) fn read(bytes: Arc<[u8]>, options: &ReadOptions) -> Result<ZfpVolume>
 
 /// Writes the stream `bytes` to `writer` at the rate asked for: as it is where that is its own
 /// already, otherwise decoded and encoded again.
-#[cfg(not(all(target_arch = "wasm32", target_os = "unknown")))]
 pub(super) fn convert(
     bytes: Arc<[u8]>,
     writer: impl Write,
@@ -58,7 +57,6 @@ pub(super) fn convert(
 }
 
 /// Writes a headerless stream to `writer` with zfp's header, at the rate asked for.
-#[cfg(not(all(target_arch = "wasm32", target_os = "unknown")))]
 pub(super) fn convert_headerless(
     bytes: Arc<[u8]>,
     layout: &Headerless,
