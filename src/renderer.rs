@@ -307,7 +307,11 @@ impl ProgressiveIsoRenderer {
             let (stages, cache, decode) = (&self.stages, &self.cache, &self.decode);
             let Picture { rays, rounds, .. } = &mut self.picture;
             rounds.record_round(encoder, &stages.rays, rays, &mut |encoder| {
-                stages.service.record(encoder, cache);
+                {
+                    let _span = tracing::trace_span!("lru_cache_gpu.service").entered();
+                    stages.service.record(encoder, cache);
+                }
+                let _span = tracing::trace_span!("zfp_gpu.decode").entered();
                 stages.decode.record_indirect(encoder, decode, cache.decode_args(), 0);
             });
         }

@@ -310,6 +310,7 @@ impl BlockSortedRounds {
 
     /// The next n active blocks of every active ray, and the requests for their samples.
     fn record_advance(&self, encoder: &mut wgpu::CommandEncoder, rays: &RayBuffers) {
+        let _span = tracing::trace_span!("wavefront.advance").entered();
         let kernels = &self.kernels;
         let side = &self.sides[rays.side()];
         {
@@ -324,6 +325,7 @@ impl BlockSortedRounds {
 
     /// The ready pairs grouped by slot, and the list of visible slots.
     fn record_grouping(&self, encoder: &mut wgpu::CommandEncoder) {
+        let _span = tracing::trace_span!("wavefront.grouping").entered();
         let kernels = &self.kernels;
         encoder.clear_buffer(&self.slot_counts, 0, None);
         {
@@ -365,6 +367,7 @@ impl Rounds for BlockSortedRounds {
         make_resident(encoder);
         self.record_grouping(encoder);
         {
+            let _span = tracing::trace_span!("wavefront.intersect").entered();
             let side = &self.sides[rays.side()];
             let mut pass = begin(encoder, "wavefront.intersect");
             let kernels = &self.kernels;

@@ -146,6 +146,7 @@ impl Rays {
         encoder: &mut wgpu::CommandEncoder,
         buffers: &mut RayBuffers,
     ) {
+        let _span = tracing::trace_span!("wavefront.resolve").entered();
         {
             let mut pass = begin(encoder, "wavefront.resolve");
             let side = &buffers.sides[buffers.side];

@@ -67,6 +67,7 @@ impl Rounds for RunAheadRounds {
         make_resident: MakeResident<'_>,
     ) {
         {
+            let _span = tracing::trace_span!("wavefront.walk").entered();
             let mut pass = begin(encoder, "wavefront.walk");
             let bind = &self.binds[rays.side()];
             self.walk.dispatch_indirect(&mut pass, bind, rays.args(), 0);
