@@ -38,10 +38,10 @@ impl Default for DrawTarget {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(crate) struct DrawParams {
-    rows: [[f32; 4]; 4],
-    depth_none: f32,
-    linear_color: u32,
-    pad: [u32; 2],
+    pub(crate) rows: [[f32; 4]; 4],
+    pub(crate) depth_none: f32,
+    pub(crate) linear_color: u32,
+    pub(crate) pad: [u32; 2],
 }
 
 /// The pipeline for one kind of target.

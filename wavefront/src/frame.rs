@@ -11,14 +11,14 @@ use crate::{Camera, Error};
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct GridParams {
-    blocks: [u32; 3],
-    coarse_count: u32,
-    coarse: [u32; 3],
-    has_third_level: u32,
-    third: [u32; 3],
-    pad0: u32,
-    last_cell: [i32; 3],
-    pad1: u32,
+    pub(crate) blocks: [u32; 3],
+    pub(crate) coarse_count: u32,
+    pub(crate) coarse: [u32; 3],
+    pub(crate) has_third_level: u32,
+    pub(crate) third: [u32; 3],
+    pub(crate) pad0: u32,
+    pub(crate) last_cell: [i32; 3],
+    pub(crate) pad1: u32,
 }
 
 impl GridParams {
@@ -41,20 +41,20 @@ impl GridParams {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct FrameParams {
-    origin: [f32; 3],
-    isovalue: f32,
-    origin_dx: [f32; 3],
-    width: u32,
-    origin_dy: [f32; 3],
-    height: u32,
-    direction: [f32; 3],
-    start_depth: f32,
-    direction_dx: [f32; 3],
-    look_ahead: u32,
-    direction_dy: [f32; 3],
-    pad1: u32,
-    grid: GridParams,
-    lru: LruParams,
+    pub(crate) origin: [f32; 3],
+    pub(crate) isovalue: f32,
+    pub(crate) origin_dx: [f32; 3],
+    pub(crate) width: u32,
+    pub(crate) origin_dy: [f32; 3],
+    pub(crate) height: u32,
+    pub(crate) direction: [f32; 3],
+    pub(crate) start_depth: f32,
+    pub(crate) direction_dx: [f32; 3],
+    pub(crate) look_ahead: u32,
+    pub(crate) direction_dy: [f32; 3],
+    pub(crate) pad1: u32,
+    pub(crate) grid: GridParams,
+    pub(crate) lru: LruParams,
 }
 
 pub(crate) const PARAMS_BYTES: u64 = size_of::<FrameParams>() as u64;

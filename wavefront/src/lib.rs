@@ -3,9 +3,12 @@
 #[cfg(feature = "block-sorted")]
 mod block_sorted;
 mod camera;
+pub mod cpu;
 pub mod draw;
 mod error;
 pub mod frame;
+#[cfg(test)]
+mod layout_tests;
 mod outputs;
 mod plan;
 mod rays;
