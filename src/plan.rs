@@ -183,6 +183,10 @@ impl StrategyPlan {
     }
 
     /// Bytes beside rays and pictures, with a cache of `slots` slots.
+    #[cfg_attr(
+        not(feature = "block-sorted"),
+        expect(unused_variables, reason = "RunAhead needs nothing for a slot")
+    )]
     fn bytes(&self, slots: u64) -> u64 {
         match self {
             Self::RunAhead => 0,
@@ -192,12 +196,13 @@ impl StrategyPlan {
     }
 
     fn part(&self, slots: u64) -> Part {
+        let bytes = self.bytes(slots);
         match self {
-            Self::RunAhead => left_out("block pairs", "strategy RunAhead"),
+            Self::RunAhead => Part { bytes, ..left_out("block pairs", "strategy RunAhead") },
             #[cfg(feature = "block-sorted")]
             Self::BlockSorted(options, _) => part(
                 "block pairs",
-                self.bytes(slots),
+                bytes,
                 format!("strategy BlockSorted, start factor {}", options.start_factor),
             ),
         }

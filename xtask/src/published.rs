@@ -42,18 +42,20 @@ fn users_features(features: &Value) -> Vec<String> {
     names.filter(others).cloned().collect()
 }
 
-/// Checks that every published crate compiles without features and with each of them alone.
+/// Checks that every published crate compiles without features and with each of them alone, and
+/// without warnings.
 pub(crate) fn check_features() -> Result<(), String> {
     for package in published()?.iter().filter(|package| !package.features.is_empty()) {
         for feature in [None].into_iter().chain(package.features.iter().map(Some)) {
             let mut cargo = process::cargo();
-            cargo.args(["check", "--quiet", "--no-default-features", "-p", &package.name]);
+            cargo.args(["clippy", "--quiet", "--locked", "--no-default-features", "--no-deps"]);
+            cargo.args(["-p", &package.name]);
             if let Some(feature) = feature {
                 cargo.args(["--features", feature]);
             }
             let feature = feature.map_or("no features", String::as_str);
             println!("features: {}, {feature}", package.name);
-            process::run(cargo.arg("--locked"))?;
+            process::run(cargo.args(["--", "-D", "warnings"]))?;
         }
     }
     Ok(())
