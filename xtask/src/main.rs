@@ -19,7 +19,7 @@ usage: cargo xtask COMMAND
                     where it is found (further arguments go to both runs of cargo test)
   msrv              check that no dependency of a published crate needs a newer Rust
   features          check that every published crate compiles with each of its features alone
-  outside           build a program outside the workspace that uses the published crate
+  outside           build and run a program outside the workspace that uses the published crate
   package [ARGUMENTS]
                     make the archives of all published crates (further arguments go to cargo)
   adapter           print the GPU adapter that demo and test use
@@ -35,7 +35,7 @@ fn main() -> ExitCode {
         ("test", _) => test(&rest),
         ("msrv", []) => msrv::check(),
         ("features", []) => published::check_features(),
-        ("outside", []) => published::build_outside(),
+        ("outside", []) => published::run_outside(),
         ("package", _) => published::package(&rest),
         ("adapter", []) => adapter::describe().map(|description| println!("{description}")),
         _ => {

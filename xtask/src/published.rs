@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::process;
+use crate::{adapter, process};
 
 /// Features that only examples of this repository use.
 const NOT_FOR_USERS: [&str; 1] = ["window"];
@@ -74,14 +74,15 @@ pub(crate) fn package(arguments: &[String]) -> Result<(), String> {
     Ok(())
 }
 
-/// Builds a program outside the workspace, with the versions of the workspace's lock file.
-pub(crate) fn build_outside() -> Result<(), String> {
+/// Builds and runs a program outside the workspace, with the versions of the workspace's lock file.
+pub(crate) fn run_outside() -> Result<(), String> {
+    adapter::ensure()?;
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."));
     let outside = root.join("tests/outside-crate");
     std::fs::copy(root.join("Cargo.lock"), outside.join("Cargo.lock"))
         .map_err(|error| format!("the lock file cannot be copied: {error}"))?;
     let mut cargo = process::cargo();
-    cargo.current_dir(&outside).args(["build", "--quiet", "--target-dir"]);
+    cargo.current_dir(&outside).args(["run", "--quiet", "--target-dir"]);
     process::run(cargo.arg(root.join("target/outside")))
 }
 
