@@ -1,6 +1,7 @@
 //! The renderer: schedule, state and reports.
 
 use bytemuck::{Pod, Zeroable};
+use gpu_primitives::kernel::dispatches_recorded;
 use gpu_primitives::memory::{Buffer, Category, Ledger};
 use gpu_primitives::readback::ReadbackRing;
 use gpu_primitives::upload::UploadRing;
@@ -109,6 +110,7 @@ struct Submitted {
     frame: u64,
     pass: u32,
     rounds: u32,
+    dispatches: u32,
     cpu_ms: f64,
 }
 
@@ -256,7 +258,7 @@ impl ProgressiveIsoRenderer {
         if !self.readback.has_room() {
             return Ok(self.report(false));
         }
-        let begin = Instant::now();
+        let (begin, dispatches) = (Instant::now(), dispatches_recorded());
         let span = tracing::debug_span!("progressive_iso.pass", frame = self.frame_count);
         let _entered = span.enter();
         self.timer.record_begin(encoder);
@@ -264,7 +266,8 @@ impl ProgressiveIsoRenderer {
             self.record_frame(device, encoder);
         }
         self.timer.record_end(encoder);
-        self.record_counters(device, encoder, begin);
+        let dispatches = dispatches_recorded().wrapping_sub(dispatches) as u32;
+        self.record_counters(device, encoder, begin, dispatches);
         Ok(self.report(true))
     }
 
@@ -356,6 +359,7 @@ impl ProgressiveIsoRenderer {
         device: &wgpu::Device,
         encoder: &mut wgpu::CommandEncoder,
         begin: Instant,
+        dispatches: u32,
     ) {
         let (ray_offset, ray_bytes) = wavefront::Counters::BYTES;
         let (cache_offset, cache_bytes) = lru_cache_gpu::Counters::BYTES;
@@ -373,7 +377,7 @@ impl ProgressiveIsoRenderer {
                 _ => (0, 0, 0),
             };
             let cpu_ms = begin.elapsed().as_secs_f64() * 1e3;
-            self.submitted.push(Submitted { tag, frame, pass, rounds, cpu_ms });
+            self.submitted.push(Submitted { tag, frame, pass, rounds, dispatches, cpu_ms });
         }
     }
 
@@ -404,6 +408,7 @@ impl ProgressiveIsoRenderer {
         report.frame = submitted.frame;
         report.pass = submitted.pass;
         report.rounds = submitted.rounds;
+        report.dispatches = submitted.dispatches;
         report.cpu_ms = submitted.cpu_ms;
         report.gpu_ms = self.timer.milliseconds(record.ticks);
         report.rays = self.options.size[0] * self.options.size[1];

@@ -39,6 +39,8 @@ pub struct PassReport {
     pub ray_block_pairs: u32,
     /// `BlockSorted`: blocks intersected in the pass's last round; 0 otherwise.
     pub visible_blocks: u32,
+    /// Dispatches recorded for the described pass.
+    pub dispatches: u32,
     /// CPU time of recording the described pass, in milliseconds.
     pub cpu_ms: f64,
     /// GPU time of the described pass in milliseconds, where the device has timestamp queries.

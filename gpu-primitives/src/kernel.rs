@@ -1,7 +1,24 @@
 //! Compute pipelines with explicit bind group layouts.
 
+use std::cell::Cell;
+
 use crate::indirect;
 use crate::wgsl::Composed;
+
+thread_local! {
+    static DISPATCHES: Cell<u64> = const { Cell::new(0) };
+}
+
+/// Dispatches that this thread has recorded through [`Kernel`] so far: for reports and for tests
+/// that something is left out.
+#[must_use]
+pub fn dispatches_recorded() -> u64 {
+    DISPATCHES.get()
+}
+
+fn count_dispatch() {
+    DISPATCHES.set(DISPATCHES.get().wrapping_add(1));
+}
 
 /// One binding of a compute kernel, in order of `@binding` index in group 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -174,6 +191,7 @@ impl Kernel {
     /// [`indirect::fold`]; nothing for 0.
     pub fn dispatch(&self, pass: &mut wgpu::ComputePass<'_>, bind: &wgpu::BindGroup, groups: u64) {
         let [x, y, z] = indirect::fold(groups);
+        count_dispatch();
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, bind, &[]);
         pass.dispatch_workgroups(x, y, z);
@@ -187,6 +205,7 @@ impl Kernel {
         args: &wgpu::Buffer,
         offset_bytes: u64,
     ) {
+        count_dispatch();
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, bind, &[]);
         pass.dispatch_workgroups_indirect(args, offset_bytes);

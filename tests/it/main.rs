@@ -9,5 +9,6 @@ mod budget;
 mod compare;
 mod errors;
 mod invariance;
+mod left_out;
 mod reference;
 mod support;
