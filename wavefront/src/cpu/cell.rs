@@ -119,7 +119,7 @@ pub fn turning_points(b: [f32; 4]) -> [f32; 2] {
     [roots[0].min(roots[1]), roots[0].max(roots[1])]
 }
 
-/// How often the sides change along (`inside_low`, b1, b2, `inside_high`).
+/// How often the sides change along the four coefficients, those at the ends given.
 fn sign_changes(b: [f32; 4], inside_low: bool, inside_high: bool) -> usize {
     let sides = [inside_low, b[1] >= 0.0, b[2] >= 0.0, inside_high];
     sides.windows(2).filter(|pair| pair[0] != pair[1]).count()

@@ -1,0 +1,8 @@
+//! Tests of the crate through its public API; one binary, so that wgpu is linked once.
+
+#![allow(clippy::unwrap_used, reason = "a failed set-up fails the test")]
+
+mod fields;
+mod harness;
+mod twin;
+mod watertight;
