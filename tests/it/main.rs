@@ -7,8 +7,8 @@
 mod bounds;
 mod budget;
 mod compare;
+mod draw;
 mod errors;
 mod invariance;
-mod left_out;
 mod reference;
 mod support;
