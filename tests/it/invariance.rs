@@ -72,7 +72,7 @@ impl Shot {
             1 => scene.orthographic([sin, 0.3, cos], size),
             _ => {
                 let eye = [0.5, 0.45, 0.55];
-                scene.from_to(eye, [eye[0] + 0.3 * sin, 0.5, eye[2] + 0.3 * cos], size)
+                scene.looking(eye, [eye[0] + 0.3 * sin, 0.5, eye[2] + 0.3 * cos], size)
             }
         };
         let mut frame = scene.frame(camera);

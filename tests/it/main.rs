@@ -3,6 +3,7 @@
 //! `docs/testing.md` says how to run them on other drivers.
 
 #![allow(clippy::unwrap_used, reason = "a failed set-up fails the test")]
+#![allow(clippy::print_stdout, reason = "measured numbers, shown with --nocapture")]
 
 mod bounds;
 mod budget;

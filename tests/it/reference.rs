@@ -33,7 +33,7 @@ fn views(scene: &Scene) -> [(&'static str, Camera); 3] {
     [
         ("orbit", scene.orbit(33.0, 21.0, SIZE)),
         ("orthographic", scene.orthographic([-0.6, 0.35, 0.9], SIZE)),
-        ("inside", scene.from_to([0.47, 0.55, 0.41], [0.9, 0.45, 0.2], SIZE)),
+        ("inside", scene.looking([0.47, 0.55, 0.41], [0.9, 0.45, 0.2], SIZE)),
     ]
 }
 
@@ -84,6 +84,36 @@ fn an_oblique_marschner_lobb_signal_agrees_with_the_reference() {
 #[test]
 fn turbulence_agrees_with_the_reference() {
     compare("turbulence", &Scene::generated("turbulence", [90, 77, 67], 6.0));
+}
+
+/// P15: whatever the encoder was given beyond the volume's end, the picture is that of the samples
+/// inside.
+#[test]
+fn padding_does_not_show() {
+    let dims = [33, 30, 27];
+    let field = volumes::by_name("turbulence", dims).unwrap();
+    let mut encoder = volume_io::BlockEncoder::new(dims, 20.0).unwrap();
+    for _ in 0..encoder.block_count() {
+        let (origin, valid) = (encoder.next_origin(), encoder.next_valid());
+        let mut block = volumes::sample_block(&*field, dims, origin.map(|o| o / 4));
+        for (n, sample) in block.iter_mut().enumerate() {
+            let p = [n & 3, n >> 2 & 3, n >> 4].map(|v| v as u32);
+            if (0..3).any(|a| p[a] >= valid[a]) {
+                *sample = if n % 2 == 0 { 3.0 } else { -3.0 };
+            }
+        }
+        encoder.push(&block).unwrap();
+    }
+    let scene =
+        Scene { volume: encoder.finish().unwrap(), ..Scene::generated("turbulence", dims, 1.0) };
+    let (samples, gpu) = (scene.volume.decode(), Gpu::new());
+    // Views onto the faces at the upper ends, which partial blocks fill.
+    for camera in [scene.orbit(45.0, 35.0, SIZE), scene.orthographic([0.3, 0.9, 0.2], SIZE)] {
+        let expected = Expected::new(&scene, &samples, &camera, SIZE);
+        let picture = gpu.render(&scene, options(SIZE), &scene.frame(camera));
+        let summary = expected.check(&picture).unwrap();
+        assert!(summary.hits > 10_000 && summary.excused <= 1, "{summary:?}");
+    }
 }
 
 /// The comparison notices one wrong pixel of any kind.

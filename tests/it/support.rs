@@ -72,7 +72,7 @@ impl Scene {
         Self { volume, world_from_index, isovalue: field.suggested_isovalue() as f32 }
     }
 
-    /// Samples at 48 bits per voxel, which lose nothing that tests of small integers notice.
+    /// The same volume elsewhere.
     pub(crate) fn placed(self, world_from_index: [[f64; 4]; 4]) -> Self {
         Self { world_from_index, ..self }
     }
@@ -119,7 +119,7 @@ impl Scene {
     }
 
     /// A wide view from one place to another, both as shares of the extent.
-    pub(crate) fn from_to(&self, eye: [f64; 3], target: [f64; 3], size: [u32; 2]) -> Camera {
+    pub(crate) fn looking(&self, eye: [f64; 3], target: [f64; 3], size: [u32; 2]) -> Camera {
         let (_, radius) = self.compressed().bounding_ball();
         let (near, far) = (1e-3 * radius, 4.0 * radius);
         let (eye, target) = (self.at(eye), self.at(target));
