@@ -49,7 +49,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     println!("adapter  {}", gpu.name());
     let mut frames = Vec::new();
     for case in sets::cases(arguments.set) {
-        if arguments.volume.as_ref().is_some_and(|part| !case.volume.contains(part.as_str())) {
+        if arguments.volume.as_ref().is_some_and(|part| !case.name().contains(part.as_str())) {
             continue;
         }
         println!(
