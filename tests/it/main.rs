@@ -11,6 +11,5 @@ mod compare;
 mod draw;
 mod errors;
 mod invariance;
-mod published;
 mod reference;
 mod support;

@@ -53,7 +53,8 @@ fn compare(name: &str, scene: &Scene) {
             Err(problem) => panic!("{name}, {view}: {problem}"),
         }
     }
-    println!("{name}: {sum:?}");
+    let adapter = gpu_testkit::gpu::adapter_info();
+    println!("{name} on {} ({:?}): {sum:?}", adapter.name, adapter.backend);
     assert!(sum.hits * 10 > sum.rays, "hardly anything to see");
     assert!((sum.excused as f64) < 1e-5 * sum.rays as f64, "{} rays excused", sum.excused);
     assert!(sum.vague_colors * 20 < sum.hits, "{} colours are vague", sum.vague_colors);
