@@ -132,7 +132,7 @@ fn parts_left_out_cost_nothing() {
 }
 
 #[test]
-fn dropping_a_renderer_and_changing_sizes_leaves_nothing_behind() {
+fn changing_sizes_leaves_nothing_behind() {
     let gpu = Gpu::new();
     let scene = Scene::generated("gyroid", [40, 41, 43], 8.0);
     let size = [80, 60];
