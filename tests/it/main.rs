@@ -11,5 +11,6 @@ mod compare;
 mod draw;
 mod errors;
 mod invariance;
+mod published;
 mod reference;
 mod support;
