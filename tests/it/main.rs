@@ -11,6 +11,7 @@ mod compare;
 mod draw;
 mod errors;
 mod invariance;
+mod left_out;
 mod published;
 mod reference;
 mod support;
