@@ -415,6 +415,7 @@ impl ProgressiveIsoRenderer {
         report.entered_rays = record.rays.entered;
         report.active_rays = record.rays.active;
         report.hits = record.rays.hits;
+        report.blocks_used = since(record.cache.used, record.cache_before.used);
         report.blocks_requested = since(record.cache.requested, record.cache_before.requested);
         report.blocks_decoded = since(record.cache.decoded, record.cache_before.decoded);
         report.speculation = record.statistics.speculation;

@@ -27,6 +27,10 @@ pub struct PassReport {
     pub active_rays: u32,
     /// Pixels that show the surface.
     pub hits: u32,
+    /// Resident blocks that rays used in this frame, once per round each. With `blocks_requested`,
+    /// the growth from pass to pass is the number of blocks that a pass needs (the published
+    /// "active blocks", neighbours included).
+    pub blocks_used: u32,
     /// Blocks requested in this frame, once per round each.
     pub blocks_requested: u32,
     /// Blocks decoded in this frame, repeats included.

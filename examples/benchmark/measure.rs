@@ -46,6 +46,8 @@ pub struct FrameRow {
     /// Of every pass: pairs per active ray and visible blocks (`BlockSorted`), active rays after it.
     pub speculation: Vec<u32>,
     pub visible_blocks: Vec<u32>,
+    /// Blocks that each pass needed: used ones and requested ones, neighbours included.
+    pub active_blocks: Vec<u32>,
     pub active_rays: Vec<u32>,
     pub overhead_bytes: u64,
     pub compressed_bytes: u64,
@@ -175,18 +177,23 @@ impl Measured {
             evicted: 0,
             speculation: Vec::new(),
             visible_blocks: Vec::new(),
+            active_blocks: Vec::new(),
             active_rays: Vec::new(),
             overhead_bytes: 0,
             compressed_bytes: 0,
             peak_bytes: 0,
             setup_ms: self.setup_ms,
         };
+        let mut needed = 0;
         let begin = Instant::now();
         self.renderer.set_frame(frame)?;
         let last = self.renderer.render_to_completion(&gpu.device, &gpu.queue, |_, report| {
             times.push((report.completeness_pixels(), begin.elapsed().as_secs_f64() * 1e3));
             row.speculation.push(report.speculation);
             row.visible_blocks.push(report.visible_blocks);
+            let needed_now = report.blocks_used + report.blocks_requested;
+            row.active_blocks.push(needed_now - needed);
+            needed = needed_now;
             row.active_rays.push(report.active_rays);
             true
         })?;

@@ -109,6 +109,7 @@ pub struct PassEntry {
     pub entered_rays: u32,
     pub active_rays: u32,
     pub hits: u32,
+    pub blocks_used: u32,
     pub blocks_requested: u32,
     pub blocks_decoded: u32,
     pub blocks_evicted: u32,
@@ -120,17 +121,18 @@ pub struct PassEntry {
 
 impl PassEntry {
     /// Heads of the columns of [`PassEntry::line`].
-    pub const HEAD: &str = "pass  complete  decoded  active rays      ms";
+    pub const HEAD: &str = "pass  complete  decoded  active rays      ms      MB";
 
     /// One line of a table.
     pub fn line(&self) -> String {
         format!(
-            "{:4} {:8.2}% {:8} {:12} {:7.0}",
+            "{:4} {:8.2}% {:8} {:12} {:7.0} {:7.1}",
             self.pass,
             self.completeness * 100.0,
             self.blocks_decoded,
             self.active_rays,
             self.ms,
+            self.bytes as f64 / 1e6,
         )
     }
 
@@ -144,6 +146,7 @@ impl PassEntry {
             entered_rays: report.entered_rays,
             active_rays: report.active_rays,
             hits: report.hits,
+            blocks_used: report.blocks_used,
             blocks_requested: report.blocks_requested,
             blocks_decoded: report.blocks_decoded,
             blocks_evicted: report.blocks_evicted,

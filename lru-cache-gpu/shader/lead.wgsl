@@ -65,7 +65,10 @@ fn serve_leader() -> u32 {
     }
     var served = 0u;
     for (var i = 0u; i < count; i++) {
-        if (leader_entry(i) < LRU_FIRST_SLOT) {
+        let entry = leader_entry(i);
+        if (entry < LRU_FIRST_SLOT) {
+            // What others requested, too, is counted with the list.
+            atomicAdd(&lru_state[LRU_REQUESTED_TOTAL], u32(entry == LRU_ABSENT));
             let block = atomicLoad(&lru_state[LRU_LEADER + i]);
             var slot = block;
             if (!lru_holds_all()) {

@@ -38,7 +38,7 @@ impl FinishParams {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct Counters {
-    /// Blocks asked for, each once per round; the leader's not included.
+    /// Blocks asked for, the leader's included, each once per round.
     pub requested: u32,
     /// Blocks given a slot, to be decoded.
     pub decoded: u32,
@@ -46,6 +46,8 @@ pub struct Counters {
     pub evicted: u32,
     /// Requests that found no slot.
     pub deferred: u32,
+    /// Resident blocks that rays used, each once per round.
+    pub used: u32,
 }
 
 impl Counters {
@@ -219,10 +221,10 @@ mod tests {
         };
         says("LRU_JOB_COUNT", JOB_COUNT_WORD);
         says("LRU_HEADER", HEADER_WORDS);
-        let counters = ["REQUESTED", "DECODED", "EVICTED", "DEFERRED"];
+        let counters = ["REQUESTED", "DECODED", "EVICTED", "DEFERRED", "USED"];
         for (word, name) in (COUNTER_WORD..).zip(counters) {
             says(&format!("LRU_{name}_TOTAL"), word);
         }
-        assert_eq!(Counters::BYTES.1, 16);
+        assert_eq!(Counters::BYTES.1, 20);
     }
 }

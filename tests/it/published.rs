@@ -20,6 +20,8 @@ use crate::support::{Gpu, Scene, options};
 struct Pass {
     speculation: u32,
     visible_blocks: u32,
+    /// The visible blocks and their plus-side neighbours.
+    active_blocks: u32,
     active_rays_after: u32,
 }
 
@@ -52,9 +54,24 @@ fn way(
     way
 }
 
+fn with_neighbours(grid: &Grid, blocks: &HashSet<u64>) -> HashSet<u64> {
+    let [x, y, z] = grid.blocks().map(u64::from);
+    let mut all = HashSet::new();
+    for block in blocks {
+        let position = [block % x, block / x % y, block / (x * y)];
+        for corner in 0..8_u64 {
+            let [i, j, k] = [0, 1, 2].map(|a| position[a] + ((corner >> a) & 1));
+            if i < x && j < y && k < z {
+                all.insert(i + x * (j + y * k));
+            }
+        }
+    }
+    all
+}
+
 /// The published algorithm: every pass takes each active ray to its next n active blocks, n being
 /// as many as fill `capacity` pairs, `most` at most.
-fn simulate(ways: &[Way], capacity: usize, most: usize) -> Vec<Pass> {
+fn simulate(grid: &Grid, ways: &[Way], capacity: usize, most: usize) -> Vec<Pass> {
     // The empty-space step ends rays without active blocks.
     let mut active: Vec<(&Way, usize)> =
         ways.iter().filter(|way| !way.blocks.is_empty()).map(|way| (way, 0)).collect();
@@ -71,6 +88,7 @@ fn simulate(ways: &[Way], capacity: usize, most: usize) -> Vec<Pass> {
         passes.push(Pass {
             speculation: speculation as u32,
             visible_blocks: visible.len() as u32,
+            active_blocks: with_neighbours(grid, &visible).len() as u32,
             active_rays_after: active.len() as u32,
         });
     }
@@ -86,14 +104,18 @@ fn rendered(gpu: &Gpu, scene: &Scene, size: [u32; 2], options: BlockSortedOption
         ProgressiveIsoRenderer::new(&gpu.device, &gpu.queue, scene.compressed(), options).unwrap();
     renderer.set_frame(&scene.frame(scene.orbit(35.0, 20.0, size))).unwrap();
     let mut passes = Vec::new();
+    let mut needed = 0;
     renderer
         .render_to_completion(&gpu.device, &gpu.queue, |_, report| {
             if report.pass > 0 {
+                let needed_now = report.blocks_used + report.blocks_requested;
                 passes.push(Pass {
                     speculation: report.speculation,
                     visible_blocks: report.visible_blocks,
+                    active_blocks: needed_now - needed,
                     active_rays_after: report.active_rays,
                 });
+                needed = needed_now;
             }
             true
         })
@@ -138,14 +160,14 @@ fn passes_are_those_of_the_published_algorithm() {
     let pixels = (size[0] * size[1]) as usize;
     for (name, dims) in [("gyroid", [41, 42, 43]), ("turbulence", [48, 45, 39])] {
         let scene = Scene::generated(name, dims, 16.0);
-        let ways = ways(&scene, size);
+        let (grid, ways) = (Grid::new(dims), ways(&scene, size));
         let step = BlockSortedOptions { start_factor: 1, speculation: false };
-        let predicted = simulate(&ways, pixels, 1);
+        let predicted = simulate(&grid, &ways, pixels, 1);
         assert!(predicted.len() > 4, "{name}: {} passes say little", predicted.len());
         assert_eq!(rendered(&gpu, &scene, size, step), predicted, "{name}, one block a pass");
         for start_factor in [1, 3, 8] {
             let options = BlockSortedOptions { start_factor, speculation: true };
-            let predicted = simulate(&ways, pixels * start_factor as usize, 64);
+            let predicted = simulate(&grid, &ways, pixels * start_factor as usize, 64);
             let rendered = rendered(&gpu, &scene, size, options);
             assert_eq!(rendered, predicted, "{name}, start factor {start_factor}");
         }
@@ -157,9 +179,9 @@ fn a_simulation_of_another_algorithm_is_noticed() {
     let gpu = Gpu::new();
     let size = [48, 32];
     let scene = Scene::generated("gyroid", [41, 42, 43], 16.0);
-    let ways = ways(&scene, size);
+    let (grid, ways) = (Grid::new(scene.volume.dims), ways(&scene, size));
     let options = BlockSortedOptions { start_factor: 1, speculation: true };
     let rendered = rendered(&gpu, &scene, size, options);
-    assert_ne!(rendered, simulate(&ways, 2 * (size[0] * size[1]) as usize, 64));
-    assert_ne!(rendered, simulate(&ways, (size[0] * size[1]) as usize, 1));
+    assert_ne!(rendered, simulate(&grid, &ways, 2 * (size[0] * size[1]) as usize, 64));
+    assert_ne!(rendered, simulate(&grid, &ways, (size[0] * size[1]) as usize, 1));
 }

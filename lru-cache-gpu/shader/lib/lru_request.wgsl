@@ -7,11 +7,12 @@ fn lru_lookup(block: u32) -> u32 {
     return select(LRU_MISSING, entry - LRU_FIRST_SLOT, entry >= LRU_FIRST_SLOT);
 }
 
-// Keeps the slot for the rest of this round and marks it as used.
+// Keeps the slot for the rest of this round and marks it as used, which counts once per round.
 fn lru_touch(slot: u32) {
     let clock = atomicLoad(&lru_state[LRU_CLOCK]);
-    if (atomicLoad(&lru_state[lru_stamp_word(slot)]) != clock) {
-        atomicStore(&lru_state[lru_stamp_word(slot)], clock);
+    if (atomicLoad(&lru_state[lru_stamp_word(slot)]) != clock
+        && atomicExchange(&lru_state[lru_stamp_word(slot)], clock) != clock) {
+        atomicAdd(&lru_state[LRU_USED_TOTAL], 1u);
     }
 }
 

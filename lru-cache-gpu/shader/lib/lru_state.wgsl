@@ -19,6 +19,7 @@ const LRU_REQUESTED_TOTAL: u32 = 8u;
 const LRU_DECODED_TOTAL: u32 = 9u;
 const LRU_EVICTED_TOTAL: u32 = 10u;
 const LRU_DEFERRED_TOTAL: u32 = 11u;
+const LRU_USED_TOTAL: u32 = 12u;
 const LRU_LEADER: u32 = 16u;        // the leader's blocks
 const LRU_LEADER_CAPACITY: u32 = 8u;
 const LRU_HEADER: u32 = 24u;

@@ -2,7 +2,7 @@
 
 use super::Cache;
 use super::service::{
-    ABSENT, FIRST_SLOT, LEADER, LEADER_CAPACITY, LEADER_COUNT, REQUEST_COUNT, REQUESTED,
+    ABSENT, FIRST_SLOT, LEADER, LEADER_CAPACITY, LEADER_COUNT, REQUEST_COUNT, REQUESTED, USED_TOTAL,
 };
 
 impl Cache {
@@ -13,8 +13,11 @@ impl Cache {
 
     /// Keeps the slot for the rest of this round and marks it as used.
     pub fn touch(&mut self, slot: u32) {
-        let word = self.stamp_word(slot);
-        self.state[word] = self.clock();
+        let (word, clock) = (self.stamp_word(slot), self.clock());
+        if self.state[word] != clock {
+            self.state[word] = clock;
+            self.state[USED_TOTAL] += 1;
+        }
     }
 
     /// Asks for an absent block.

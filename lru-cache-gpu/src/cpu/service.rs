@@ -21,6 +21,7 @@ const REQUESTED_TOTAL: usize = 8;
 const DECODED_TOTAL: usize = 9;
 const EVICTED_TOTAL: usize = 10;
 const DEFERRED_TOTAL: usize = 11;
+pub(super) const USED_TOTAL: usize = 12;
 pub(super) const LEADER: usize = 16;
 pub(super) const LEADER_CAPACITY: usize = 8;
 const HEADER: usize = HEADER_WORDS as usize;
@@ -86,6 +87,7 @@ impl Cache {
             decoded: self.state[DECODED_TOTAL],
             evicted: self.state[EVICTED_TOTAL],
             deferred: self.state[DEFERRED_TOTAL],
+            used: self.state[USED_TOTAL],
         }
     }
 
@@ -174,6 +176,9 @@ impl Cache {
         let mut jobs = Vec::new();
         for &block in &blocks {
             if self.lookup(block).is_none() {
+                // What others requested, too, is counted with the list.
+                let alone = self.directory[block as usize] == ABSENT;
+                self.state[REQUESTED_TOTAL] += u32::from(alone);
                 let slot = if self.holds_all() { block } else { self.leader_victim() };
                 self.place(block, slot, PINNED);
                 jobs.push([block, slot]);
