@@ -118,7 +118,7 @@ fn cell_first_crossing(b: vec4<f32>, inside_low: bool, inside_high: bool) -> Cel
     return CellBracket(true, select(0.0, select(turns.x, turns.y, turns.y < 1.0), turns.x < 1.0), 1.0);
 }
 
-// The crossing inside a bracket: false position with halved weights, every third step a bisection,
+// The crossing inside a bracket: false position with halved weights, every other step a bisection,
 // until the bracket is 2^-22 of the segment or the field is exactly 0.
 fn cell_root(b: vec4<f32>, bracket: CellBracket, inside_low: bool) -> f32 {
     var low = bracket.low;
@@ -130,7 +130,7 @@ fn cell_root(b: vec4<f32>, bracket: CellBracket, inside_low: bool) -> f32 {
         let width = high - low;
         var share = 0.5;
         let change = value_low - value_high;
-        if (step % 3u != 2u && abs(change) > 1.0e-37) {
+        if ((step & 1u) == 0u && abs(change) > 1.0e-37) {
             share = clamp(value_low / change, 0.0, 1.0);
         }
         root = low + width * share;

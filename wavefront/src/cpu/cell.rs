@@ -174,7 +174,7 @@ pub fn root(b: [f32; 4], bracket: Bracket, inside_low: bool) -> f32 {
         let width = high - low;
         let change = value_low - value_high;
         let mut share = 0.5_f32;
-        if step % 3 != 2 && change.abs() > 1.0e-37 {
+        if step % 2 == 0 && change.abs() > 1.0e-37 {
             share = (value_low / change).clamp(0.0, 1.0);
         }
         root = low + width * share;
