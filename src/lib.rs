@@ -7,6 +7,7 @@ mod options;
 mod plan;
 mod renderer;
 mod report;
+mod stages;
 mod timing;
 mod volume;
 

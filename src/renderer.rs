@@ -5,18 +5,16 @@ use gpu_primitives::kernel::dispatches_recorded;
 use gpu_primitives::memory::{Buffer, Category, Ledger};
 use gpu_primitives::readback::ReadbackRing;
 use gpu_primitives::upload::UploadRing;
-use lru_cache_gpu::{CacheBuffers, Service};
-use macrocell::{Activate, Masks, RangeBuffers};
-use wavefront::{
-    Draw, DrawBuffers, FrameView, OutputTextures, RayBuffers, Rays, Rounds, RunAhead, Scene,
-    ShadingParams, Statistics, Strategy,
-};
+use lru_cache_gpu::CacheBuffers;
+use macrocell::{Masks, RangeBuffers};
+use wavefront::{FrameView, OutputTextures, ShadingParams, Statistics};
 use web_time::Instant;
-use zfp_gpu::{Decode, DecodeBuffers, Payload};
+use zfp_gpu::{DecodeBuffers, Payload};
 
 use crate::capture::PendingCapture;
 use crate::load::Loader;
-use crate::plan::{PARAMS_CHUNK, PASSES_IN_FLIGHT, StrategyPlan};
+use crate::plan::{PARAMS_CHUNK, PASSES_IN_FLIGHT};
+use crate::stages::{Picture, Stages, cache};
 use crate::timing::Timer;
 use crate::{CompressedVolume, Error, Frame, PassReport, RendererOptions, ScenePlan, wgpu};
 
@@ -71,26 +69,6 @@ pub struct ProgressiveIsoRenderer {
     clear_cache: bool,
     submitted: Vec<Submitted>,
     report: PassReport,
-}
-
-/// Pipelines; nothing here depends on a picture's size.
-#[derive(Debug)]
-struct Stages {
-    activate: Activate,
-    service: Service,
-    decode: Decode,
-    rays: Rays,
-    strategy: Box<dyn Strategy>,
-    draw: Option<Draw>,
-}
-
-/// Everything that depends on the picture's size.
-#[derive(Debug)]
-struct Picture {
-    textures: OutputTextures,
-    rays: RayBuffers,
-    rounds: Box<dyn Rounds>,
-    draw: Option<DrawBuffers>,
 }
 
 #[derive(Debug)]
@@ -606,77 +584,4 @@ fn wait(device: &wgpu::Device) -> Result<(), Error> {
     #[expect(clippy::disallowed_methods, reason = "offline use blocks by request")]
     let result = device.poll(wgpu::PollType::wait_indefinitely());
     result.map(|_| ()).map_err(|error| Error::Device(error.to_string()))
-}
-
-fn cache(
-    device: &wgpu::Device,
-    ledger: &Ledger,
-    stages: &Stages,
-    plan: &ScenePlan,
-    payload: &Payload,
-) -> Result<(CacheBuffers, DecodeBuffers), Error> {
-    let cache =
-        CacheBuffers::new(device, ledger, &stages.service, &plan.cache, Decode::JOBS_PER_GROUP);
-    let pages: Vec<&wgpu::Buffer> = cache.slots().iter().map(|page| &**page).collect();
-    let decode = DecodeBuffers::new(
-        device,
-        ledger,
-        &stages.decode,
-        payload,
-        cache.jobs(),
-        cache.job_count(),
-        &pages,
-        plan.cache.params().slots_per_page,
-    )?;
-    Ok((cache, decode))
-}
-
-fn strategy(device: &wgpu::Device, plan: &ScenePlan) -> Box<dyn Strategy> {
-    let pages = plan.cache.page_count();
-    match plan.strategy {
-        StrategyPlan::RunAhead => Box::new(RunAhead::new(device, pages)),
-        #[cfg(feature = "block-sorted")]
-        StrategyPlan::BlockSorted(_, plan) => {
-            Box::new(wavefront::BlockSorted::new(device, pages, plan))
-        }
-    }
-}
-
-impl Stages {
-    fn new(
-        device: &wgpu::Device,
-        plan: &ScenePlan,
-        options: &RendererOptions,
-    ) -> Result<Self, Error> {
-        let _span = tracing::info_span!("progressive_iso.pipelines").entered();
-        let pages = plan.cache.page_count();
-        Ok(Self {
-            activate: Activate::new(device, plan.macrocell.grid().has_third_level()),
-            service: Service::new(device),
-            decode: Decode::new(device, pages)?,
-            rays: Rays::new(device, plan.wavefront.outputs(), pages),
-            strategy: strategy(device, plan),
-            draw: options.draw_target.map(|target| Draw::new(device, &target)),
-        })
-    }
-}
-
-impl Picture {
-    fn new(
-        device: &wgpu::Device,
-        ledger: &Ledger,
-        stages: &Stages,
-        plan: &ScenePlan,
-        masks: &Masks,
-        cache: &CacheBuffers,
-    ) -> Self {
-        let wavefront = &plan.wavefront;
-        let textures = OutputTextures::new(device, ledger, wavefront.outputs(), wavefront.size());
-        let rays = RayBuffers::new(device, ledger, &stages.rays, wavefront, cache, &textures);
-        let scene = Scene { rays: &rays, masks: masks.buffer(), cache };
-        let rounds = stages.strategy.bind(device, ledger, scene);
-        let draw =
-            stages.draw.as_ref().and_then(|d| DrawBuffers::new(device, ledger, d, &textures));
-        Self { textures, rays, rounds, draw }
-    }
 }

@@ -1,7 +1,7 @@
 //! P24: strategy `BlockSorted` takes the passes, speculation counts and visible blocks that the
 //! published algorithm takes, as predicted by a simulation of it on the CPU.
 
-use std::collections::HashSet;
+use std::collections::BTreeSet;
 
 use macrocell::Grid;
 use macrocell::cpu::dda::{CellBox, Ray};
@@ -54,9 +54,9 @@ fn way(
     way
 }
 
-fn with_neighbours(grid: &Grid, blocks: &HashSet<u64>) -> HashSet<u64> {
+fn with_neighbours(grid: &Grid, blocks: &BTreeSet<u64>) -> BTreeSet<u64> {
     let [x, y, z] = grid.blocks().map(u64::from);
-    let mut all = HashSet::new();
+    let mut all = BTreeSet::new();
     for block in blocks {
         let position = [block % x, block / x % y, block / (x * y)];
         for corner in 0..8_u64 {
@@ -78,7 +78,7 @@ fn simulate(grid: &Grid, ways: &[Way], capacity: usize, most: usize) -> Vec<Pass
     let mut passes = Vec::new();
     while !active.is_empty() {
         let speculation = (capacity / active.len()).clamp(1, most);
-        let mut visible: HashSet<u64> = HashSet::new();
+        let mut visible: BTreeSet<u64> = BTreeSet::new();
         for (way, position) in &mut active {
             let end = (*position + speculation).min(way.blocks.len());
             visible.extend(&way.blocks[*position..end]);
