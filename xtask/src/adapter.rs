@@ -2,9 +2,7 @@
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
-use std::process::Command;
-
-use gpu_testkit::gpu;
+use std::process::{Command, Stdio};
 
 use crate::process;
 
@@ -23,44 +21,43 @@ pub(crate) const NO_SECOND_DRIVER: &str = "second driver not found, tests ran on
     Chromium for SwiftShader (Debian: apt-get install chromium) or point SWIFTSHADER_ICD at its \
     vk_swiftshader_icd.json";
 
-/// The adapter that tests and examples of this machine use, in one line.
-pub(crate) fn describe() -> Result<String, String> {
-    let info = gpu::find_adapter()?.get_info();
-    let wgpu_info = format!("{:?} {:?}", info.backend, info.device_type);
-    Ok(format!("{} ({wgpu_info}, {} {})", info.name, info.driver, info.driver_info))
+/// Environment variable that selects an adapter by a part of its name.
+const ADAPTER_VARIABLE: &str = "PROGRESSIVE_ISO_ADAPTER";
+/// Exit code of the example `adapter` when there is no adapter at all.
+const NO_ADAPTER_CODE: i32 = 3;
+
+/// The adapter that tests and examples use, in one line; `None` where there is none at all. A new
+/// process finds it, whose Vulkan loader reads its drivers again.
+fn find(variables: &[(&str, OsString)]) -> Result<Option<String>, String> {
+    let mut cargo = process::cargo();
+    cargo.args(["run", "--example", "adapter"]).envs(variables.iter().cloned());
+    let output = cargo.stderr(Stdio::inherit()).output();
+    let output = output.map_err(|error| format!("cargo did not start: {error}"))?;
+    match output.status.code() {
+        Some(0) => Ok(Some(String::from_utf8_lossy(&output.stdout).trim().to_owned())),
+        Some(NO_ADAPTER_CODE) => Ok(None),
+        _ => Err("no GPU adapter could be used, see above".to_owned()),
+    }
 }
 
-/// [`describe`] from a new process, whose Vulkan loader reads its drivers again.
-pub(crate) fn describe_in_child(variables: &[(&str, OsString)]) -> Result<String, String> {
-    let program = std::env::current_exe().map_err(|error| format!("own path unknown: {error}"))?;
-    let mut command = Command::new(program);
-    command.arg("adapter").envs(process::headless()).envs(variables.iter().cloned());
-    let output = command.output();
-    let output = output.map_err(|error| format!("own program did not start: {error}"))?;
-    if output.status.success() {
-        return Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned());
-    }
-    let message = String::from_utf8_lossy(&output.stderr);
-    let last = message.lines().last().unwrap_or("looking for a GPU adapter failed");
-    Err(last.trim_start_matches(crate::ERROR_PREFIX).to_owned())
+/// The adapter in one line.
+pub(crate) fn describe(variables: &[(&str, OsString)]) -> Result<String, String> {
+    find(variables)?.ok_or_else(|| "there is no GPU adapter, see above".to_owned())
 }
 
 /// [`describe`], after installing a software driver where there is no adapter and the system
 /// allows it.
 pub(crate) fn ensure() -> Result<String, String> {
-    let problem = match describe_in_child(&[]) {
-        Ok(description) => return Ok(description),
-        Err(problem) => problem,
-    };
-    // A name in PROGRESSIVE_ISO_ADAPTER that fits no adapter is not cured by another driver.
-    if problem != gpu::NO_ADAPTER {
-        return Err(problem);
+    if let Some(description) = find(&[])? {
+        return Ok(description);
     }
-    let Some(prefix) = administrator() else { return Err(problem) };
-    println!("no GPU adapter found: installing {} with apt-get", PACKAGES.join(" and "));
-    apt_get(prefix, &["update"])?;
-    apt_get(prefix, &[&["install", "--yes", "--no-install-recommends"], &PACKAGES[..]].concat())?;
-    describe_in_child(&[])
+    if let Some(prefix) = administrator() {
+        println!("no GPU adapter found: installing {} with apt-get", PACKAGES.join(" and "));
+        apt_get(prefix, &["update"])?;
+        let install = [&["install", "--yes", "--no-install-recommends"], &PACKAGES[..]].concat();
+        apt_get(prefix, &install)?;
+    }
+    describe(&[])
 }
 
 /// What to put before a command so that it runs as root, where apt-get is there and that is
@@ -98,7 +95,7 @@ pub(crate) fn only(icd: &Path) -> [(&'static str, OsString); 3] {
     [
         ("VK_ICD_FILENAMES", icd.into()),
         ("VK_DRIVER_FILES", icd.into()),
-        (gpu::ADAPTER_VARIABLE, "SwiftShader".into()),
+        (ADAPTER_VARIABLE, "SwiftShader".into()),
     ]
 }
 

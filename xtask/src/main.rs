@@ -37,7 +37,7 @@ fn main() -> ExitCode {
         ("features", []) => published::check_features(),
         ("outside", []) => published::run_outside(),
         ("package", _) => published::package(&rest),
-        ("adapter", []) => adapter::describe().map(|description| println!("{description}")),
+        ("adapter", []) => adapter::describe(&[]).map(|description| println!("{description}")),
         _ => {
             eprintln!("{USAGE}");
             return ExitCode::from(2);
@@ -73,7 +73,7 @@ fn test(arguments: &[String]) -> Result<(), String> {
         println!("{}", adapter::NO_SECOND_DRIVER);
         return Ok(());
     };
-    println!("second adapter: {}", adapter::describe_in_child(&adapter::only(&icd))?);
+    println!("second adapter: {}", adapter::describe(&adapter::only(&icd))?);
     // Documentation tests bring nothing new on another driver.
     let mut cargo = process::cargo();
     cargo.args(["test", "--workspace", "--tests"]).args(arguments);
