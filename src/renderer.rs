@@ -197,7 +197,8 @@ impl ProgressiveIsoRenderer {
     }
 
     /// Records one pass and submits it. Does not block; see [`PassReport`] for what the numbers
-    /// describe. While two passes are in flight nothing is recorded and `submitted` is false.
+    /// describe. While two passes are in flight, and once the frame is complete, nothing is recorded
+    /// and `submitted` is false.
     ///
     /// # Errors
     /// If no frame is set.
@@ -233,7 +234,7 @@ impl ProgressiveIsoRenderer {
         if self.frame.is_none() {
             return Err(Error::NoFrame);
         }
-        if !self.readback.has_room() {
+        if self.report.complete() || !self.readback.has_room() {
             return Ok(self.report(false));
         }
         let (begin, dispatches) = (Instant::now(), dispatches_recorded());

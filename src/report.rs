@@ -7,7 +7,8 @@
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct PassReport {
-    /// Whether this call submitted a pass; false while two are in flight.
+    /// Whether this call submitted a pass; false while two are in flight and once the frame is
+    /// complete.
     pub submitted: bool,
     /// Share of the volume that is loaded, 0 to 1; rays start at 1.
     pub loaded: f32,

@@ -1,5 +1,6 @@
 //! What a scene does not need costs nothing: no byte, no pipeline, no dispatch.
 
+use gpu_primitives::kernel::dispatches_recorded;
 use gpu_testkit::gpu;
 use progressive_iso::{
     BlockSortedOptions, Category, DrawTarget, Outputs, PassReport, ProgressiveIsoRenderer,
@@ -132,4 +133,24 @@ fn capture_is_left_out_unless_asked_for() {
     let (without, with) = (cost(&scene, without), cost(&scene, with));
     assert!(without.bytes <= without.planned && with.bytes <= with.planned);
     assert_eq!(without.compute_pipelines, with.compute_pipelines);
+}
+
+#[test]
+fn a_finished_frame_records_nothing_more() {
+    let scene = Scene::generated("gyroid", [20, 21, 22], 8.0);
+    let (device, queue) = gpu::device();
+    let options = options([40, 30]);
+    let mut renderer =
+        ProgressiveIsoRenderer::new(&device, &queue, scene.compressed(), options).unwrap();
+    let frame = scene.frame(scene.orbit(25.0, 10.0, options.size));
+    renderer.set_frame(&frame).unwrap();
+    renderer.render_to_completion(&device, &queue, |_, _| true).unwrap();
+    let before = dispatches_recorded();
+    let report = renderer.render_pass(&device, &queue).unwrap();
+    assert!(report.complete() && !report.submitted);
+    assert_eq!(dispatches_recorded(), before);
+    renderer.set_frame(&frame).unwrap();
+    let report = renderer.render_pass(&device, &queue).unwrap();
+    assert!(report.submitted && !report.complete());
+    assert!(dispatches_recorded() > before);
 }
