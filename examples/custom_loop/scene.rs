@@ -101,7 +101,7 @@ impl Scene {
             if report.complete() {
                 break;
             }
-            report = self.renderer.encode_pass(&gpu.device, encoder)?;
+            report = self.renderer.render_pass(&gpu.device, &gpu.queue)?;
             if !report.submitted {
                 break; // The GPU is behind: show what there is.
             }

@@ -357,3 +357,27 @@ fn scaling_by_powers_of_two_changes_nothing() {
         same_picture(&picture(k), &expected).unwrap_or_else(|problem| panic!("2^{k}: {problem}"));
     }
 }
+
+/// Several passes in one encoder that the caller submits.
+#[test]
+fn the_callers_own_submissions_make_the_same_picture() {
+    let gpu = Gpu::new();
+    let scene = Scene::generated("turbulence", [35, 33, 30], 8.0);
+    let options = options([48, 36]);
+    let frame = scene.frame(scene.orbit(40.0, -20.0, options.size));
+    let expected = gpu.render(&scene, options, &frame);
+    let mut renderer =
+        ProgressiveIsoRenderer::new(&gpu.device, &gpu.queue, scene.compressed(), options).unwrap();
+    renderer.set_frame(&frame).unwrap();
+    while !renderer.poll_report().complete() {
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let mut passes = 0;
+        while renderer.encode_pass(&gpu.device, &mut encoder).unwrap().submitted {
+            passes += 1;
+        }
+        assert!(passes > 0, "neither complete nor another pass");
+        gpu_testkit::gpu::submit_and_wait(&gpu.device, &gpu.queue, encoder);
+    }
+    let found = renderer.capture_blocking(&gpu.device, &gpu.queue).unwrap();
+    same_picture(&found, &expected).unwrap();
+}
