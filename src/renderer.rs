@@ -223,6 +223,9 @@ impl ProgressiveIsoRenderer {
 
     /// Like [`Self::render_pass`], into the caller's encoder, which the caller submits.
     ///
+    /// Submit encoders in the order in which they were recorded. After an encoder that is dropped
+    /// instead, set the frame again; a volume that was still loading must be made again.
+    ///
     /// # Errors
     /// If no frame is set.
     pub fn encode_pass(
