@@ -157,12 +157,13 @@ pub(crate) enum StrategyPlan {
 }
 
 impl StrategyPlan {
+    #[cfg_attr(
+        not(feature = "block-sorted"),
+        expect(unused_variables, reason = "RunAhead needs no memory of its own")
+    )]
     fn new(strategy: TraversalStrategy, rays: u64, limits: &wgpu::Limits) -> Result<Self, Error> {
         match strategy {
-            TraversalStrategy::RunAhead => {
-                debug_assert!(rays > 0 && limits.max_buffer_size > 0, "checked by the other plans");
-                Ok(Self::RunAhead)
-            }
+            TraversalStrategy::RunAhead => Ok(Self::RunAhead),
             #[cfg(feature = "block-sorted")]
             TraversalStrategy::BlockSorted(options) => {
                 let plan = wavefront::BlockSortedPlan::new(rays, options, limits)?;
