@@ -35,10 +35,17 @@ struct PassRecord {
 }
 
 /// Bytes of a [`PassRecord`].
-pub(crate) const READBACK_BYTES: u64 = size_of::<PassRecord>() as u64;
+pub(crate) const READBACK_BYTES: u64 = size_of::<PassRecord>() as u64 + PROFILE_BYTES;
+
+/// Bytes of the timestamps that are read back with a pass, and of the buffer that they come from.
+#[cfg(feature = "wgpu-profiler")]
+const PROFILE_BYTES: u64 = gpu_primitives::profile::Profiler::BYTES;
+#[cfg(not(feature = "wgpu-profiler"))]
+const PROFILE_BYTES: u64 = 0;
 
 /// Bytes of the counters kept since the frame's start and of the resolved timestamps.
-pub(crate) const CONTROL_BYTES: u64 = lru_cache_gpu::Counters::BYTES.1 + Timer::BYTES;
+pub(crate) const CONTROL_BYTES: u64 =
+    lru_cache_gpu::Counters::BYTES.1 + Timer::BYTES + PROFILE_BYTES;
 
 /// Renders one volume's isosurfaces progressively.
 ///
@@ -55,6 +62,8 @@ pub struct ProgressiveIsoRenderer {
     upload: UploadRing,
     readback: ReadbackRing,
     timer: Timer,
+    #[cfg(feature = "wgpu-profiler")]
+    profile: crate::timing::Profile,
     cache_before: Buffer,
     payload: Payload,
     ranges: RangeBuffers,
@@ -90,6 +99,8 @@ struct Submitted {
     rounds: u32,
     dispatches: u32,
     cpu_ms: f64,
+    /// Bytes of the pass's [`PassRecord`] in what is read back.
+    record_bytes: usize,
 }
 
 impl ProgressiveIsoRenderer {
@@ -139,6 +150,8 @@ impl ProgressiveIsoRenderer {
             ),
         );
         let timer = Timer::new(device, queue, &ledger);
+        #[cfg(feature = "wgpu-profiler")]
+        let profile = crate::timing::Profile::new(device, queue, &ledger);
         Ok(Self {
             volume,
             options,
@@ -149,6 +162,8 @@ impl ProgressiveIsoRenderer {
             upload,
             readback,
             timer,
+            #[cfg(feature = "wgpu-profiler")]
+            profile,
             cache_before,
             payload,
             ranges,
@@ -244,9 +259,13 @@ impl ProgressiveIsoRenderer {
         let span = tracing::debug_span!("progressive_iso.pass", frame = self.frame_count);
         let _entered = span.enter();
         self.timer.record_begin(encoder);
+        #[cfg(feature = "wgpu-profiler")]
+        self.profile.begin();
         if self.record_load(device, encoder)? {
             self.record_frame(device, encoder);
         }
+        #[cfg(feature = "wgpu-profiler")]
+        self.profile.end(encoder);
         self.timer.record_end(encoder);
         let dispatches = dispatches_recorded().wrapping_sub(dispatches) as u32;
         self.record_counters(device, encoder, begin, dispatches);
@@ -352,14 +371,19 @@ impl ProgressiveIsoRenderer {
         ];
         parts.push(self.timer.part());
         parts.extend(self.picture.rounds.statistics());
+        let record_bytes = parts.iter().map(|part| part.2 as usize).sum();
         let tag = self.submitted.last().map_or(1, |s| s.tag + 1);
+        #[cfg(feature = "wgpu-profiler")]
+        parts.extend(self.profile.part());
         if self.readback.record(device, encoder, &parts, tag) {
             let (frame, pass, rounds) = match &self.frame {
                 Some(state) if state.started => (state.number, state.passes, state.rounds),
                 _ => (0, 0, 0),
             };
             let cpu_ms = begin.elapsed().as_secs_f64() * 1e3;
-            self.submitted.push(Submitted { tag, frame, pass, rounds, dispatches, cpu_ms });
+            let submitted =
+                Submitted { tag, frame, pass, rounds, dispatches, cpu_ms, record_bytes };
+            self.submitted.push(submitted);
         }
     }
 
@@ -373,8 +397,10 @@ impl ProgressiveIsoRenderer {
             // Tags count on from the last one, so that one always stays.
             self.submitted.drain(..position);
             let mut record = PassRecord::zeroed();
-            let length = bytes.len().min(size_of::<PassRecord>());
+            let length = submitted.record_bytes.min(bytes.len()).min(size_of::<PassRecord>());
             bytemuck::bytes_of_mut(&mut record)[..length].copy_from_slice(&bytes[..length]);
+            #[cfg(feature = "wgpu-profiler")]
+            self.profile.take(&bytes[length..]);
             self.take_record(submitted, &record);
         }
     }
@@ -575,6 +601,13 @@ impl ProgressiveIsoRenderer {
     /// Bytes of GPU memory by purpose, now.
     pub fn bytes_by_category(&self) -> Vec<(Category, u64)> {
         self.ledger.by_category()
+    }
+
+    /// GPU times of the stages in the newest pass that was reported; empty where the device has no
+    /// timestamp queries.
+    #[cfg(feature = "wgpu-profiler")]
+    pub fn stage_times(&self) -> &[gpu_primitives::profile::StageTime] {
+        self.profile.newest()
     }
 
     /// The volume.

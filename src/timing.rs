@@ -84,3 +84,49 @@ impl Timer {
         Some(elapsed as f64 * f64::from(queries.nanoseconds_per_tick) * 1e-6)
     }
 }
+
+/// GPU times of the stages of passes in flight.
+#[cfg(feature = "wgpu-profiler")]
+#[derive(Debug)]
+pub(crate) struct Profile {
+    profiler: Option<gpu_primitives::profile::Profiler>,
+    /// Of the passes in flight, oldest first.
+    recorded: std::collections::VecDeque<gpu_primitives::profile::StageTimes>,
+    newest: Vec<gpu_primitives::profile::StageTime>,
+}
+
+#[cfg(feature = "wgpu-profiler")]
+impl Profile {
+    pub(crate) fn new(device: &wgpu::Device, queue: &wgpu::Queue, ledger: &Ledger) -> Self {
+        let profiler = gpu_primitives::profile::Profiler::new(device, queue, ledger);
+        Self { profiler, recorded: [].into(), newest: Vec::new() }
+    }
+
+    pub(crate) fn begin(&self) {
+        if let Some(profiler) = &self.profiler {
+            profiler.begin();
+        }
+    }
+
+    pub(crate) fn end(&mut self, encoder: &mut wgpu::CommandEncoder) {
+        if let Some(profiler) = &self.profiler {
+            self.recorded.push_back(profiler.end(encoder));
+        }
+    }
+
+    /// What to read back of the pass that ended last.
+    pub(crate) fn part(&self) -> Option<(&wgpu::Buffer, u64, u64)> {
+        Some(self.profiler.as_ref()?.part(self.recorded.back()?))
+    }
+
+    /// Takes in the ticks of the oldest pass in flight.
+    pub(crate) fn take(&mut self, ticks: &[u8]) {
+        if let Some(times) = self.recorded.pop_front() {
+            self.newest = times.sums(ticks);
+        }
+    }
+
+    pub(crate) fn newest(&self) -> &[gpu_primitives::profile::StageTime] {
+        &self.newest
+    }
+}

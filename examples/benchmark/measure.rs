@@ -1,5 +1,6 @@
 //! Renders the frames and takes the times.
 
+use std::collections::BTreeMap;
 use std::time::Instant;
 
 use progressive_iso::{
@@ -54,6 +55,8 @@ pub struct FrameRow {
     pub peak_bytes: u64,
     /// Pipelines, allocation and loading of this setting's renderer, once per volume.
     pub setup_ms: f64,
+    /// GPU milliseconds by stage; empty without the feature `wgpu-profiler`.
+    pub stage_ms: BTreeMap<String, f64>,
 }
 
 /// GPU memory of every renderer.
@@ -183,20 +186,26 @@ impl Measured {
             compressed_bytes: 0,
             peak_bytes: 0,
             setup_ms: self.setup_ms,
+            stage_ms: BTreeMap::new(),
         };
         let mut needed = 0;
         let begin = Instant::now();
         self.renderer.set_frame(frame)?;
-        let last = self.renderer.render_to_completion(&gpu.device, &gpu.queue, |_, report| {
-            times.push((report.completeness_pixels(), begin.elapsed().as_secs_f64() * 1e3));
-            row.speculation.push(report.speculation);
-            row.visible_blocks.push(report.visible_blocks);
-            let needed_now = report.blocks_used + report.blocks_requested;
-            row.active_blocks.push(needed_now - needed);
-            needed = needed_now;
-            row.active_rays.push(report.active_rays);
-            true
-        })?;
+        let last =
+            self.renderer.render_to_completion(&gpu.device, &gpu.queue, |_renderer, report| {
+                #[cfg(feature = "wgpu-profiler")]
+                for stage in _renderer.stage_times() {
+                    *row.stage_ms.entry(stage.label.clone()).or_default() += stage.ms;
+                }
+                times.push((report.completeness_pixels(), begin.elapsed().as_secs_f64() * 1e3));
+                row.speculation.push(report.speculation);
+                row.visible_blocks.push(report.visible_blocks);
+                let needed_now = report.blocks_used + report.blocks_requested;
+                row.active_blocks.push(needed_now - needed);
+                needed = needed_now;
+                row.active_rays.push(report.active_rays);
+                true
+            })?;
         let reach = |share: f64| times.iter().position(|(done, _)| *done >= share).unwrap_or(0);
         let ms = |share| times.get(reach(share)).map_or(f64::NAN, |(_, ms)| *ms);
         (row.ms_85, row.ms_90, row.ms_95, row.ms_100) = (ms(0.85), ms(0.9), ms(0.95), ms(1.0));

@@ -99,10 +99,7 @@ impl Compact {
 
     /// Records the compaction: one compute pass and one copy.
     pub fn record(&self, encoder: &mut wgpu::CommandEncoder, buffers: &CompactBuffers) {
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-            label: Some("gpu-primitives.compact"),
-            timestamp_writes: None,
-        });
+        let mut pass = crate::profile::begin_pass(encoder, "gpu-primitives.compact");
         self.args.record_in(&mut pass, &buffers.args_bind);
         self.count.dispatch_indirect(&mut pass, &buffers.count, &buffers.args, 0);
         self.scan.record_in(&mut pass, &buffers.scan);

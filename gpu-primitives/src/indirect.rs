@@ -129,10 +129,7 @@ impl IndirectArgs {
 
     /// Records one dispatch in a pass of its own.
     pub fn record(&self, encoder: &mut wgpu::CommandEncoder, buffers: &IndirectArgsBuffers) {
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-            label: Some("gpu-primitives.indirect.args"),
-            timestamp_writes: None,
-        });
+        let mut pass = crate::profile::begin_pass(encoder, "gpu-primitives.indirect.args");
         self.record_in(&mut pass, buffers);
     }
 

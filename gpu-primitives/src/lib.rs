@@ -11,6 +11,7 @@ pub mod cpu;
 pub mod indirect;
 pub mod kernel;
 pub mod memory;
+pub mod profile;
 pub mod readback;
 pub mod scan;
 pub mod sort;

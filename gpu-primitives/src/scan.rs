@@ -173,10 +173,7 @@ impl Scan {
 
     /// Records the scan in a pass of its own.
     pub fn record(&self, encoder: &mut wgpu::CommandEncoder, buffers: &ScanBuffers) {
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-            label: Some("gpu-primitives.scan"),
-            timestamp_writes: None,
-        });
+        let mut pass = crate::profile::begin_pass(encoder, "gpu-primitives.scan");
         self.record_in(&mut pass, buffers);
     }
 

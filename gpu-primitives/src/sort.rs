@@ -163,10 +163,7 @@ impl Sort {
 
     /// Records the sort in a pass of its own.
     pub fn record(&self, encoder: &mut wgpu::CommandEncoder, buffers: &SortBuffers) {
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-            label: Some("gpu-primitives.sort"),
-            timestamp_writes: None,
-        });
+        let mut pass = crate::profile::begin_pass(encoder, "gpu-primitives.sort");
         self.record_in(&mut pass, buffers);
     }
 

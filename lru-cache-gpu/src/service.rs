@@ -174,10 +174,7 @@ impl Service {
 }
 
 fn begin<'a>(encoder: &'a mut wgpu::CommandEncoder, label: &str) -> wgpu::ComputePass<'a> {
-    encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-        label: Some(label),
-        timestamp_writes: None,
-    })
+    gpu_primitives::profile::begin_pass(encoder, label)
 }
 
 #[cfg(test)]

@@ -173,10 +173,7 @@ impl Activate {
             let value = ActivateParams { page_first, page_count, isovalue, pad0: 0 };
             upload.write(device, encoder, params, 0, bytemuck::bytes_of(&value));
         }
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-            label: Some("macrocell.activate"),
-            timestamp_writes: None,
-        });
+        let mut pass = gpu_primitives::profile::begin_pass(encoder, "macrocell.activate");
         for ((_, bind), (_, page_count)) in masks.pages.iter().zip(plan.pages()) {
             self.activate.dispatch(&mut pass, bind, page_count);
         }

@@ -194,10 +194,7 @@ impl Ranges {
                 pad2: 0,
             };
             upload.write(device, encoder, &scratch.params, 0, bytemuck::bytes_of(&params));
-            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-                label: Some("macrocell.ranges"),
-                timestamp_writes: None,
-            });
+            let mut pass = gpu_primitives::profile::begin_pass(encoder, "macrocell.ranges");
             self.kernel.dispatch(&mut pass, bind, groups);
         }
     }

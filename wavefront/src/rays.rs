@@ -293,8 +293,5 @@ pub(crate) fn begin<'a>(
     encoder: &'a mut wgpu::CommandEncoder,
     label: &str,
 ) -> wgpu::ComputePass<'a> {
-    encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-        label: Some(label),
-        timestamp_writes: None,
-    })
+    gpu_primitives::profile::begin_pass(encoder, label)
 }

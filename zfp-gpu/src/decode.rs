@@ -163,10 +163,7 @@ impl DecodeBuffers {
 }
 
 fn begin_pass(encoder: &mut wgpu::CommandEncoder) -> wgpu::ComputePass<'_> {
-    encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-        label: Some("zfp-gpu.decode"),
-        timestamp_writes: None,
-    })
+    gpu_primitives::profile::begin_pass(encoder, "zfp-gpu.decode")
 }
 
 fn check_count((buffer, offset): (&wgpu::Buffer, u64)) -> Result<(), Error> {

@@ -97,10 +97,7 @@ impl BlockExtrema {
         let [nx, ny, nz] = buffers.layout.dims;
         let params = [ox, oy, oz, 0, sx, sy, sz, count, nx, ny, nz, 0];
         upload.write(device, encoder, &buffers.params, 0, bytemuck::bytes_of(&params));
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-            label: Some("zfp-gpu.extrema"),
-            timestamp_writes: None,
-        });
+        let mut pass = gpu_primitives::profile::begin_pass(encoder, "zfp-gpu.extrema");
         for (bind, &(page_first, page_blocks)) in buffers.binds.iter().zip(&buffers.pages) {
             if first < page_first + page_blocks && page_first <= last {
                 let groups = u64::from(count.div_ceil(Self::BLOCKS_PER_GROUP));
