@@ -1,8 +1,8 @@
-// Decodes the blocks of one payload page into slots of 64 f32, one invocation per (block, slot)
-// job. Jobs for blocks of other pages and for slots that do not exist are skipped.
+// Decodes the blocks of one payload page into slots of 64 f32, 32 (block, slot) jobs per workgroup.
+// Jobs for blocks of other pages and for slots that do not exist are skipped.
 
 #import indirect
-#import zfp_block
+#import zfp_group
 
 struct DecodeParams {
     slots_per_page: u32,
@@ -25,57 +25,78 @@ struct DecodeParams {
 #ifdef CACHE_PAGES_3
 @group(0) @binding(7) var<storage, read_write> cache_2: array<vec4<f32>>;
 #endif
+#ifdef CACHE_PAGES_4
+@group(0) @binding(8) var<storage, read_write> cache_3: array<vec4<f32>>;
+#endif
 
 fn zfp_word(index: u32) -> u32 {
     return payload[index];
 }
 
-fn store_row(cache_page: u32, index: u32, row: vec4<f32>) {
+// Slot of each of the group's jobs, or NO_SLOT.
+var<workgroup> job_slots: array<u32, ZFP_GROUP_BLOCKS>;
+
+const NO_SLOT: u32 = 0xffffffffu;
+
+fn store_row(slot: u32, row: u32, samples: vec4<f32>) {
+    let cache_page = slot / params.slots_per_page;
+    let index = (slot - cache_page * params.slots_per_page) * 16u + row;
     switch cache_page {
 #ifdef CACHE_PAGES_2
         case 1u: {
-            cache_1[index] = row;
+            cache_1[index] = samples;
         }
 #endif
 #ifdef CACHE_PAGES_3
         case 2u: {
-            cache_2[index] = row;
+            cache_2[index] = samples;
+        }
+#endif
+#ifdef CACHE_PAGES_4
+        case 3u: {
+            cache_3[index] = samples;
         }
 #endif
         default: {
-            cache_0[index] = row;
+            cache_0[index] = samples;
         }
     }
 }
 
-@compute @workgroup_size(JOBS_PER_GROUP)
-fn decode(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) groups: vec3<u32>,
-    @builtin(local_invocation_index) lane: u32,
-) {
-    let index = indirect_linear_group(group, groups) * JOBS_PER_GROUP + lane;
+// First phase: one invocation reads the planes of a job's block.
+fn read_job(index: u32, lane: u32) {
+    job_slots[lane] = NO_SLOT;
+    zfp_group_leave_out(lane);
     if index >= min(job_count[params.count_word], arrayLength(&jobs)) {
         return;
     }
     let job = jobs[index];
     // Wraps far beyond the page's blocks for a block of an earlier page.
     let block = job.x - page.first_block;
-    let slot = job.y;
-    if block >= page.blocks || slot >= params.slots {
+    if block >= page.blocks || job.y >= params.slots {
         return;
     }
-    var integers: array<i32, 64>;
-    let scale = zfp_decode_block(zfp_locate(page, block), page.bits_per_block, &integers);
-    let cache_page = slot / params.slots_per_page;
-    let first_row = (slot - cache_page * params.slots_per_page) * 16u;
-    for (var row = 0u; row < 16u; row++) {
-        let values = vec4<f32>(
-            zfp_value(integers[4u * row], scale),
-            zfp_value(integers[4u * row + 1u], scale),
-            zfp_value(integers[4u * row + 2u], scale),
-            zfp_value(integers[4u * row + 3u], scale),
-        );
-        store_row(cache_page, first_row + row, values);
+    job_slots[lane] = job.y;
+    zfp_group_read(lane, zfp_locate(page, block), page.bits_per_block);
+}
+
+@compute @workgroup_size(ZFP_GROUP_LANES)
+fn decode(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    if lane < ZFP_GROUP_BLOCKS {
+        read_job(indirect_linear_group(group, groups) * ZFP_GROUP_BLOCKS + lane, lane);
+    }
+    workgroupBarrier();
+    zfp_group_invert(lane);
+    for (var turn = 0u; turn < 4u; turn++) {
+        let block = turn * ZFP_GROUP_AT_ONCE + (lane >> 3u);
+        let row = lane & 7u;
+        if job_slots[block] != NO_SLOT {
+            store_row(job_slots[block], row, zfp_group_row(block, row));
+            store_row(job_slots[block], row + 8u, zfp_group_row(block, row + 8u));
+        }
     }
 }

@@ -1,7 +1,7 @@
-// Least and greatest samples of the blocks of a region, in eight classes, one invocation per block.
+// Least and greatest samples of the blocks of a region, in eight classes, 32 blocks per workgroup.
 
 #import indirect
-#import zfp_block
+#import zfp_group
 
 struct ExtremaParams {
     // First block of the region, in block coordinates; w: unused.
@@ -24,13 +24,15 @@ fn zfp_word(index: u32) -> u32 {
     return payload[index];
 }
 
-@compute @workgroup_size(BLOCKS_PER_GROUP)
-fn block_extrema(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) groups: vec3<u32>,
-    @builtin(local_invocation_index) lane: u32,
-) {
-    let element = indirect_linear_group(group, groups) * BLOCKS_PER_GROUP + lane;
+// Of each of the group's blocks: samples inside the volume on each axis, four bits each; 0 for none.
+var<workgroup> extents: array<u32, ZFP_GROUP_BLOCKS>;
+// Of each row of the blocks that are transformed at a time: least, greatest and first sample.
+var<workgroup> rows: array<vec3<f32>, 128>;
+
+// First phase: one invocation reads the planes of the region's block number `element`.
+fn read_element(element: u32, lane: u32) {
+    extents[lane] = 0u;
+    zfp_group_leave_out(lane);
     if element >= min(params.size.w, arrayLength(&extrema) / 8u) {
         return;
     }
@@ -46,29 +48,63 @@ fn block_extrema(
     if block >= page.blocks {
         return;
     }
-    var integers: array<i32, 64>;
-    let scale = zfp_decode_block(zfp_locate(page, block), page.bits_per_block, &integers);
     let extent = min(params.dims.xyz - 4u * position, vec3<u32>(4u));
+    extents[lane] = extent.x | (extent.y << 4u) | (extent.z << 8u);
+    zfp_group_read(lane, zfp_locate(page, block), page.bits_per_block);
+}
 
-    var found: array<vec2<f32>, 8>;
-    for (var kind = 0u; kind < 8u; kind++) {
-        found[kind] = vec2<f32>(EXTREMA_LARGEST, -EXTREMA_LARGEST);
+// Range of the row's samples inside the volume, and its first sample; empty for a row outside.
+fn row_extrema(block: u32, row: u32) -> vec3<f32> {
+    let extent = extents[block];
+    let samples = zfp_group_row(block, row);
+    if (row & 3u) >= ((extent >> 4u) & 15u) || (row >> 2u) >= (extent >> 8u) {
+        return vec3<f32>(EXTREMA_LARGEST, -EXTREMA_LARGEST, 0.0);
     }
-    for (var i = 0u; i < 64u; i++) {
-        let at = vec3<u32>(i & 3u, (i >> 2u) & 3u, i >> 4u);
-        if any(at >= extent) {
-            continue;
-        }
-        let value = zfp_value(integers[i], scale);
-        let zero = vec3<u32>(at == vec3<u32>(0u));
-        let faces = zero.x | (zero.y << 1u) | (zero.z << 2u);
-        for (var kind = 0u; kind < 8u; kind++) {
-            if (kind & ~faces) == 0u {
-                found[kind] = vec2<f32>(min(found[kind].x, value), max(found[kind].y, value));
-            }
+    let present = vec4<u32>(0u, 1u, 2u, 3u) < vec4<u32>(extent & 15u);
+    let low = select(vec4<f32>(EXTREMA_LARGEST), samples, present);
+    let high = select(vec4<f32>(-EXTREMA_LARGEST), samples, present);
+    return vec3<f32>(
+        min(min(low.x, low.y), min(low.z, low.w)), max(max(high.x, high.y), max(high.z, high.w)), samples.x);
+}
+
+// Range over a block's rows of one class, whose bits 1 and 2 keep only the rows with y = 0, z = 0 and
+// whose bit 0 keeps only first samples.
+fn class_extrema(first_row: u32, kind: u32) -> vec2<f32> {
+    var range = vec2<f32>(EXTREMA_LARGEST, -EXTREMA_LARGEST);
+    let step_y = select(1u, 4u, (kind & 2u) != 0u);
+    let end = select(16u, 4u, (kind & 4u) != 0u);
+    for (var row = 0u; row < end; row += step_y) {
+        let found = rows[first_row + row];
+        if found.x <= found.y {
+            let values = select(found.xy, found.zz, (kind & 1u) != 0u);
+            range = vec2<f32>(min(range.x, values.x), max(range.y, values.y));
         }
     }
-    for (var kind = 0u; kind < 8u; kind++) {
-        extrema[element * 8u + kind] = found[kind];
+    return range;
+}
+
+@compute @workgroup_size(ZFP_GROUP_LANES)
+fn block_extrema(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let first = indirect_linear_group(group, groups) * ZFP_GROUP_BLOCKS;
+    if lane < ZFP_GROUP_BLOCKS {
+        read_element(first + lane, lane);
+    }
+    workgroupBarrier();
+    zfp_group_invert(lane);
+    let kind = lane & 7u;
+    for (var turn = 0u; turn < 4u; turn++) {
+        let block = turn * ZFP_GROUP_AT_ONCE + (lane >> 3u);
+        let first_row = 16u * (lane >> 3u);
+        rows[first_row + kind] = row_extrema(block, kind);
+        rows[first_row + kind + 8u] = row_extrema(block, kind + 8u);
+        workgroupBarrier();
+        if extents[block] != 0u {
+            extrema[(first + block) * 8u + kind] = class_extrema(first_row, kind);
+        }
+        workgroupBarrier();
     }
 }

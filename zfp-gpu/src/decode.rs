@@ -11,7 +11,7 @@ use crate::{Error, Payload, wgsl};
 const DECODE: Module = Module { name: "decode", source: include_str!("../shader/decode.wgsl") };
 
 /// Most cache pages that one dispatch can bind beside its inputs.
-const MAX_CACHE_PAGES: u32 = 3;
+const MAX_CACHE_PAGES: u32 = 4;
 
 /// Bytes of a slot: 64 samples.
 pub const SLOT_BYTES: u64 = 256;
@@ -35,9 +35,9 @@ pub struct DecodeBuffers {
 
 impl Decode {
     /// Jobs per workgroup, for the arguments of an indirect dispatch.
-    pub const JOBS_PER_GROUP: u32 = 64;
+    pub const JOBS_PER_GROUP: u32 = 32;
 
-    /// Makes the pipeline for a cache of 1 to 3 pages.
+    /// Makes the pipeline for a cache of 1 to 4 pages.
     ///
     /// # Errors
     /// [`Error::CachePages`] for any other number of pages.
@@ -56,9 +56,9 @@ impl Decode {
             return Err(Error::CachePages { expected, found: cache_pages as usize });
         }
         let constants = [
-            ("JOBS_PER_GROUP", Constant::U32(Self::JOBS_PER_GROUP)),
             ("CACHE_PAGES_2", Constant::Bool(cache_pages >= 2)),
             ("CACHE_PAGES_3", Constant::Bool(cache_pages >= 3)),
+            ("CACHE_PAGES_4", Constant::Bool(cache_pages >= 4)),
         ];
         let mut bindings = vec![
             Binding::Uniform { bytes: PAGE_PARAM_BYTES },
@@ -70,7 +70,7 @@ impl Decode {
         bindings.extend((0..cache_pages).map(|_| Binding::StorageReadWrite { min_bytes: 16 }));
         Ok(KernelSource {
             label: "zfp-gpu.decode",
-            wgsl: compose_fixed(DECODE, &[indirect::MODULE, wgsl::BLOCK], &constants),
+            wgsl: compose_fixed(DECODE, &[indirect::MODULE, wgsl::BLOCK, wgsl::GROUP], &constants),
             entry_point: "decode",
             bindings,
         })

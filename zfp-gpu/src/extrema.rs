@@ -4,7 +4,7 @@ use gpu_primitives::indirect;
 use gpu_primitives::kernel::{Binding, Kernel, KernelSource};
 use gpu_primitives::memory::{Buffer, Category, Ledger};
 use gpu_primitives::upload::UploadRing;
-use gpu_primitives::wgsl::{Constant, Module, compose_fixed};
+use gpu_primitives::wgsl::{Module, compose_fixed};
 
 use crate::plan::PAGE_PARAM_BYTES;
 use crate::{Error, Payload, StreamLayout, wgsl};
@@ -39,7 +39,7 @@ impl BlockExtrema {
     pub const BYTES_PER_BLOCK: u64 = 64;
 
     /// Blocks per workgroup.
-    const BLOCKS_PER_GROUP: u32 = 64;
+    const BLOCKS_PER_GROUP: u32 = 32;
 
     /// Makes the pipeline.
     #[must_use]
@@ -50,10 +50,9 @@ impl BlockExtrema {
     /// Text and bindings of the kernel.
     #[must_use]
     pub fn source() -> KernelSource {
-        let constants = [("BLOCKS_PER_GROUP", Constant::U32(Self::BLOCKS_PER_GROUP))];
         KernelSource {
             label: "zfp-gpu.extrema",
-            wgsl: compose_fixed(EXTREMA, &[indirect::MODULE, wgsl::BLOCK], &constants),
+            wgsl: compose_fixed(EXTREMA, &[indirect::MODULE, wgsl::BLOCK, wgsl::GROUP], &[]),
             entry_point: "block_extrema",
             bindings: vec![
                 Binding::Uniform { bytes: PAGE_PARAM_BYTES },

@@ -2,11 +2,15 @@
 
 use gpu_primitives::wgsl::Module;
 
-/// Reads, transforms and converts one block: the struct `ZfpPage` of a payload page's parameters,
-/// `zfp_locate(page, block in page) -> (word, bit)`, `zfp_decode_block(start, bits per block,
-/// integers) -> scale` and `zfp_value(integer, scale) -> f32`, and their separate steps.
+/// The parts of decoding a block: the struct `ZfpPage` of a payload page's parameters,
+/// `zfp_locate(page, block in page) -> (word, bit)`, reading planes, `zfp_invert_lift`,
+/// `zfp_value(integer, scale) -> f32`.
 ///
 /// The importing text supplies `fn zfp_word(index: u32) -> u32`, usually a load from
 /// [`Payload::page_words`](crate::Payload::page_words).
 pub const BLOCK: Module =
     Module { name: "zfp_block", source: include_str!("../shader/lib/zfp_block.wgsl") };
+
+/// Decodes 32 blocks by a workgroup of 64 invocations; imports [`BLOCK`].
+pub const GROUP: Module =
+    Module { name: "zfp_group", source: include_str!("../shader/lib/zfp_group.wgsl") };

@@ -11,12 +11,12 @@ use gpu_primitives::kernel::{Binding, KernelSource};
 use gpu_primitives::wgsl::{Module, compose};
 use gpu_testkit::gpu::{buffer_with, read_f32s, sentinel_buffer, submit_and_wait};
 use zfp_gpu::cpu::decode::decode_words;
-use zfp_gpu::wgsl::BLOCK;
+use zfp_gpu::wgsl::{BLOCK, GROUP};
 
 const SHADER: Module = Module {
     name: "formula",
     source: "
-#import zfp_block
+#import zfp_group
 @group(0) @binding(0) var<uniform> page: ZfpPage;
 @group(0) @binding(1) var<storage, read> blocks: array<u32>;
 @group(0) @binding(2) var<storage, read_write> samples: array<f32>;
@@ -28,13 +28,20 @@ fn zfp_word(index: u32) -> u32 {
     return word ^ (word >> 13u);
 }
 
-@compute @workgroup_size(1)
-fn main(@builtin(workgroup_id) group: vec3<u32>) {
-    var integers: array<i32, 64>;
-    let start = zfp_locate(page, blocks[group.x]);
-    let scale = zfp_decode_block(start, page.bits_per_block, &integers);
-    for (var i = 0u; i < 64u; i++) {
-        samples[group.x * 64u + i] = zfp_value(integers[i], scale);
+@compute @workgroup_size(ZFP_GROUP_LANES)
+fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    if lane == 0u {
+        zfp_group_read(lane, zfp_locate(page, blocks[group.x]), page.bits_per_block);
+    } else if lane < ZFP_GROUP_BLOCKS {
+        zfp_group_leave_out(lane);
+    }
+    workgroupBarrier();
+    zfp_group_invert(lane);
+    if lane < 16u {
+        let row = zfp_group_row(0u, lane);
+        for (var i = 0u; i < 4u; i++) {
+            samples[group.x * 64u + lane * 4u + i] = row[i];
+        }
     }
 }
 ",
@@ -58,7 +65,7 @@ fn blocks_beyond_32_bit_addresses_equal_the_cpu() {
     let gpu = Gpu::new();
     let source = KernelSource {
         label: "test.formula",
-        wgsl: compose(SHADER, &[BLOCK], &[]).unwrap(),
+        wgsl: compose(SHADER, &[BLOCK, GROUP], &[]).unwrap(),
         entry_point: "main",
         bindings: vec![
             Binding::Uniform { bytes: 16 },

@@ -124,7 +124,7 @@ fn indirect_dispatches_equal_direct_ones() {
     let (layout, stream, payload) = small_case(&mut gpu);
     let jobs: Vec<_> = (0..96).map(|i| [i, 95 - i]).collect();
     let list = gpu.storage(jobs.as_flattened());
-    let args = gpu.storage(&[9, 9, 2, 1, 1, 9]);
+    let args = gpu.storage(&[9, 9, 3, 1, 1, 9]);
     let count = gpu.storage(&[80]);
     let cache = Cache::new(&gpu, 1, 96);
     let buffers = cache.bind(&gpu, &payload, &list, (&count, 0));
@@ -133,7 +133,7 @@ fn indirect_dispatches_equal_direct_ones() {
     submit_and_wait(&gpu.device, &gpu.queue, encoder);
     let found = cache.read(&gpu);
     let expected = expected(&stream, &layout, &jobs[..80], found.len());
-    assert_same_bits(&found, &expected, "80 jobs of two groups");
+    assert_same_bits(&found, &expected, "80 jobs of three groups");
 }
 
 #[test]
@@ -199,7 +199,7 @@ fn reported_bytes_are_allocated_bytes() {
 fn unfit_buffers_are_refused() {
     let mut gpu = Gpu::new();
     let (_, _, payload) = small_case(&mut gpu);
-    assert!(matches!(Decode::new(&gpu.device, 4), Err(Error::CachePages { found: 4, .. })));
+    assert!(matches!(Decode::new(&gpu.device, 5), Err(Error::CachePages { found: 5, .. })));
     let decode = Decode::new(&gpu.device, 2).unwrap();
     let slots = sentinel_buffer(&gpu.device, 4 * SLOT_BYTES, SENTINEL);
     let words = gpu.storage(&[0; 4]);

@@ -8,7 +8,7 @@ use gpu_testkit::layout::{BindingKind, check_bindings, check_struct, validate_wg
 use zfp_gpu::{BlockExtrema, Decode};
 
 fn sources() -> Vec<KernelSource> {
-    let decodes = (1..=3).map(|pages| Decode::source(pages).unwrap());
+    let decodes = (1..=4).map(|pages| Decode::source(pages).unwrap());
     decodes.chain([BlockExtrema::source()]).collect()
 }
 
@@ -44,7 +44,7 @@ fn entry_points_have_the_announced_group_size() {
         let module = naga::front::wgsl::parse_str(&source.wgsl.source).unwrap();
         let names: Vec<_> = module.entry_points.iter().map(|e| e.name.as_str()).collect();
         assert_eq!(names, [source.entry_point]);
-        assert_eq!(module.entry_points[0].workgroup_size, [Decode::JOBS_PER_GROUP, 1, 1]);
+        assert_eq!(module.entry_points[0].workgroup_size, [64, 1, 1]);
     }
 }
 

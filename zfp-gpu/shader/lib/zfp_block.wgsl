@@ -1,6 +1,7 @@
-// Decodes one fixed-rate block of 4x4x4 f32 from an array of 32-bit words.
+// The parts of decoding a fixed-rate block of 4x4x4 f32: reading its bit planes from an array of
+// 32-bit words, undoing the transform of four values, making a sample of an integer.
 // The importing text supplies the array: fn zfp_word(index: u32) -> u32, with at least two words
-// behind the last block. Reading a block, transforming it and converting its values are separate.
+// behind the last block.
 
 // Where the blocks of one payload page lie.
 struct ZfpPage {
@@ -28,12 +29,13 @@ const ZFP_PLANES: u32 = 32u;
 const ZFP_ZERO_EXPONENT: u32 = 30u;
 const ZFP_NEGABINARY: u32 = 0xaaaaaaaau;
 
-// Position of coefficient i, as x + 4y + 16z: by total sequency, then by energy.
-const ZFP_PERMUTATION = array<u32, 64>(
-    0u, 1u, 4u, 16u, 20u, 17u, 5u, 2u, 8u, 32u, 21u, 6u, 18u, 24u, 9u, 33u,
-    36u, 3u, 12u, 48u, 22u, 25u, 37u, 40u, 34u, 10u, 7u, 19u, 28u, 13u, 49u, 52u,
-    41u, 38u, 26u, 23u, 29u, 53u, 11u, 35u, 44u, 14u, 50u, 56u, 42u, 27u, 39u, 45u,
-    30u, 54u, 57u, 60u, 51u, 15u, 43u, 46u, 58u, 61u, 55u, 31u, 62u, 59u, 47u, 63u,
+// The coefficients of the four samples x + 4y + 16z, z = 0 .. 3, of line x + 4y, a byte each. zfp orders
+// coefficients by total sequency, then by energy.
+const ZFP_COEFFICIENTS = array<u32, 16>(
+    0x13090300u, 0x1e0f0501u, 0x2a180c07u, 0x34271b11u,
+    0x1f100402u, 0x25160a06u, 0x3121140bu, 0x3a2e231au,
+    0x2b170d08u, 0x3220150eu, 0x382c2219u, 0x3d362d26u,
+    0x33281c12u, 0x392f241du, 0x3c373029u, 0x3f3e3b35u,
 );
 
 // Word and bit at which a block of the page starts; block counts from the page's first. Bit
@@ -103,34 +105,44 @@ fn zfp_skip_to_one(reader: ptr<function, ZfpReader>) {
     }
 }
 
+// Reads a group bit and, where it is 1, the run behind it; false where the plane ends.
+fn zfp_read_group(reader: ptr<function, ZfpReader>) -> bool {
+    let bits = zfp_peek(reader);
+    if (bits & 1u) == 0u {
+        zfp_skip(reader, 1u);
+        return false;
+    }
+    let limit = min((*reader).budget - 1u, 63u - (*reader).significant);
+    let zeros = min(countTrailingZeros(bits >> 1u), limit);
+    if zeros > 30u {
+        // The run goes on beyond the 31 bits in sight.
+        zfp_skip(reader, 1u);
+        zfp_skip_to_one(reader);
+        return true;
+    }
+    (*reader).significant += zeros;
+    zfp_skip(reader, zeros + select(1u, 2u, zeros < limit));
+    return true;
+}
+
 // Reads one bit plane: bit i of the 64 belongs to coefficient i.
 fn zfp_read_plane(reader: ptr<function, ZfpReader>) -> vec2<u32> {
     let verbatim = min((*reader).significant, (*reader).budget);
     let low_count = min(verbatim, 32u);
-    var plane = vec2<u32>(0u, 0u);
-    plane.x = zfp_read(reader, low_count);
-    plane.y = zfp_read(reader, verbatim - low_count);
+    var plane = vec2<u32>(zfp_read(reader, low_count), 0u);
+    if verbatim > low_count {
+        plane.y = zfp_read(reader, verbatim - low_count);
+    }
     while (*reader).budget > 0u && (*reader).significant < 64u {
-        if zfp_read(reader, 1u) == 0u {
+        if !zfp_read_group(reader) {
             break;
         }
-        zfp_skip_to_one(reader);
         let one = 1u << ((*reader).significant & 31u);
         let is_low = (*reader).significant < 32u;
         plane |= vec2<u32>(select(0u, one, is_low), select(one, 0u, is_low));
         (*reader).significant += 1u;
     }
     return plane;
-}
-
-// Sets the given digit of the coefficients first, first + 1, .. whose bit is set in half.
-fn zfp_scatter(digits: ptr<function, array<i32, 64>>, half: u32, first: u32, digit: i32) {
-    var rest = half;
-    while rest != 0u {
-        let position = ZFP_PERMUTATION[first + countTrailingZeros(rest)];
-        (*digits)[position] |= digit;
-        rest &= rest - 1u;
-    }
 }
 
 // Signed value of 32 negabinary digits.
@@ -155,59 +167,6 @@ fn zfp_invert_lift(v: vec4<i32>) -> vec4<i32> {
     d += a;
     a = (a << 1u) - d;
     return vec4<i32>(a, b, c, d);
-}
-
-fn zfp_invert_line(integers: ptr<function, array<i32, 64>>, start: u32, stride: u32) {
-    let i = vec4<u32>(start, start + stride, start + 2u * stride, start + 3u * stride);
-    let v = vec4<i32>((*integers)[i.x], (*integers)[i.y], (*integers)[i.z], (*integers)[i.w]);
-    let lifted = zfp_invert_lift(v);
-    (*integers)[i.x] = lifted.x;
-    (*integers)[i.y] = lifted.y;
-    (*integers)[i.z] = lifted.z;
-    (*integers)[i.w] = lifted.w;
-}
-
-// Undoes the decorrelating transform along z, then y, then x.
-fn zfp_invert_transform(integers: ptr<function, array<i32, 64>>) {
-    for (var line = 0u; line < 16u; line++) {
-        zfp_invert_line(integers, line, 16u);
-    }
-    for (var line = 0u; line < 16u; line++) {
-        zfp_invert_line(integers, (line & 3u) + 16u * (line >> 2u), 4u);
-    }
-    for (var line = 0u; line < 16u; line++) {
-        zfp_invert_line(integers, 4u * line, 1u);
-    }
-}
-
-// Reads the block at start into integers at their positions (x + 4y + 16z) and returns the scale
-// that zfp_value multiplies them with; 0 for a block of zeros, whose integers are 0.
-fn zfp_decode_block(
-    start: vec2<u32>,
-    bits_per_block: u32,
-    integers: ptr<function, array<i32, 64>>,
-) -> f32 {
-    for (var i = 0u; i < 64u; i++) {
-        (*integers)[i] = 0;
-    }
-    var reader = zfp_reader(start, bits_per_block);
-    let exponent = zfp_read_exponent(&reader);
-    if exponent <= ZFP_ZERO_EXPONENT {
-        return 0.0;
-    }
-    var plane_bit = ZFP_PLANES;
-    while reader.budget > 0u && plane_bit > 0u {
-        plane_bit -= 1u;
-        let plane = zfp_read_plane(&reader);
-        let digit = bitcast<i32>(1u << plane_bit);
-        zfp_scatter(integers, plane.x, 0u, digit);
-        zfp_scatter(integers, plane.y, 32u, digit);
-    }
-    for (var i = 0u; i < 64u; i++) {
-        (*integers)[i] = zfp_signed(bitcast<u32>((*integers)[i]));
-    }
-    zfp_invert_transform(integers);
-    return zfp_scale(exponent);
 }
 
 // 2^(exponent - 127 - 30) for a biased block exponent above ZFP_ZERO_EXPONENT.
