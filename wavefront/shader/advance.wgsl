@@ -16,24 +16,22 @@ fn macrocell_mask(index: u32) -> vec2<u32> {
 
 // The ray's state before the first pair is composited: the block after its last pair, or done.
 fn advance(ray: DdaRay, first_block: vec3<i32>, first_pair: u32, count: u32) -> u32 {
-    let box = dda_box(first_block * 4, 2u, frame.grid.last_cell);
-    let entry = dda_entry(ray, box);
     var place = macrocell_advance(
-        frame.grid, ray, MacrocellPlace(entry, dda_cell_after(ray, entry, box)));
+        frame.grid, ray, macrocell_enter(frame.grid, ray, first_block));
     for (var k = 0u; k < count; k++) {
-        if (!macrocell_inside(frame.grid, place.cell)) {
+        if (!macrocell_inside(frame.grid, place.block)) {
             pairs[PAIRS_HEADER + first_pair + k] = PAIR_NONE;
             continue;
         }
-        let block = macrocell_linear(place.cell >> vec3<u32>(2u), frame.grid.blocks);
+        let block = macrocell_linear(place.block, frame.grid.blocks);
         pairs[PAIRS_HEADER + first_pair + k] = PAIR_WAITS | block;
         place = macrocell_advance(
-            frame.grid, ray, macrocell_leave(frame.grid, ray, place, 2u));
+            frame.grid, ray, macrocell_leave(frame.grid, ray, place));
     }
-    if (!macrocell_inside(frame.grid, place.cell)) {
+    if (!macrocell_inside(frame.grid, place.block)) {
         return RAY_DONE;
     }
-    return RAY_ACTIVE | macrocell_linear(place.cell >> vec3<u32>(2u), frame.grid.blocks);
+    return RAY_ACTIVE | macrocell_linear(place.block, frame.grid.blocks);
 }
 
 @compute @workgroup_size(64)

@@ -31,6 +31,12 @@ fn block_take(need: u32) -> bool {
     return true; // pairs come here when all samples are resident
 }
 
+fn block_cell_is_empty(bit: u32) -> bool {
+    return false;
+}
+
+fn block_set_empty(bit: u32) {}
+
 fn block_sample(x: i32, y: i32, z: i32) -> f32 {
     return vertices[x + 5 * y + 25 * z];
 }
@@ -52,7 +58,7 @@ fn intersect(pair: u32, position: vec3<i32>) {
     let ray = frame_ray(frame, frame_pixel(frame, id)).ray;
     let box = dda_box(position * 4, 2u, frame.grid.last_cell);
     let entry = dda_entry(ray, box);
-    let start = MacrocellPlace(entry, dda_cell_after(ray, entry, box));
+    let start = CellPlace(entry, dda_cell_after(ray, entry, box));
     if (block_walk(ray, start, box, frame.isovalue).hit) {
         let block = pairs[PAIRS_HEADER + pair] & PAIR_BLOCK;
         pairs[PAIRS_HEADER + pair] = PAIR_HIT | block;

@@ -39,12 +39,18 @@ fn lru_slots_per_page() -> u32 {
 
 fn block_use(slot: u32) {}
 
+fn block_cell_is_empty(bit: u32) -> bool {
+    return false;
+}
+
+fn block_set_empty(bit: u32) {}
+
 // Finds the hit again: the first crossing in the block, whose samples are still resident.
 fn hit_in_block(ray: DdaRay, block: vec3<i32>) -> BlockWalk {
     block_open(block);
     let box = dda_box(block * 4, 2u, frame.grid.last_cell);
     let entry = dda_entry(ray, box);
-    return block_walk(ray, MacrocellPlace(entry, dda_cell_after(ray, entry, box)), box, frame.isovalue);
+    return block_walk(ray, CellPlace(entry, dda_cell_after(ray, entry, box)), box, frame.isovalue);
 }
 
 fn resolve(id: u32, block: u32) {

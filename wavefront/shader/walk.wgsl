@@ -37,6 +37,12 @@ fn block_use(slot: u32) {
     lru_touch(slot);
 }
 
+fn block_cell_is_empty(bit: u32) -> bool {
+    return false;
+}
+
+fn block_set_empty(bit: u32) {}
+
 // Keeps or requests the needed samples of the opened block. The oldest active ray leads: it is served
 // whatever the others ask for.
 fn request(need: u32, leads: bool) {
@@ -62,29 +68,28 @@ fn request_ahead(ray: DdaRay, start: MacrocellPlace, leads: bool) {
     var place = start;
     for (var ahead = 0u; ahead < frame.look_ahead; ahead++) {
         if (ahead > 0u) {
-            place = macrocell_advance(frame.grid, ray, macrocell_leave(frame.grid, ray, place, 2u));
-            if (!macrocell_inside(frame.grid, place.cell)) {
+            place = macrocell_advance(frame.grid, ray, macrocell_leave(frame.grid, ray, place));
+            if (!macrocell_inside(frame.grid, place.block)) {
                 return;
             }
         }
-        block_open(place.cell >> vec3<u32>(2u));
-        let need = block_need(ray, place, dda_box(place.cell, 2u, frame.grid.last_cell));
+        block_open(place.block);
+        let box = macrocell_box(frame.grid, place.block);
+        let need = block_need(ray, dda_cell_after(ray, place.event, box), box);
         request(need, leads && ahead == 0u);
     }
 }
 
 // The ray's new state.
 fn walk(ray: DdaRay, first_block: vec3<i32>, leads: bool) -> u32 {
-    let first_box = dda_box(first_block * 4, 2u, frame.grid.last_cell);
-    let entry = dda_entry(ray, first_box);
-    let start = MacrocellPlace(entry, dda_cell_after(ray, entry, first_box));
-    var place = macrocell_advance(frame.grid, ray, start);
-    while (macrocell_inside(frame.grid, place.cell)) {
-        let block = place.cell >> vec3<u32>(2u);
-        let state = macrocell_linear(block, frame.grid.blocks);
-        block_open(block);
-        let box = dda_box(place.cell, 2u, frame.grid.last_cell);
-        let result = block_walk(ray, place, box, frame.isovalue);
+    var place = macrocell_advance(
+        frame.grid, ray, macrocell_enter(frame.grid, ray, first_block));
+    while (macrocell_inside(frame.grid, place.block)) {
+        let state = macrocell_linear(place.block, frame.grid.blocks);
+        block_open(place.block);
+        let box = macrocell_box(frame.grid, place.block);
+        let start = CellPlace(place.event, dda_cell_after(ray, place.event, box));
+        let result = block_walk(ray, start, box, frame.isovalue);
         if (result.hit) {
             return RAY_HIT | state;
         }
@@ -92,7 +97,8 @@ fn walk(ray: DdaRay, first_block: vec3<i32>, leads: bool) -> u32 {
             request_ahead(ray, place, leads);
             return RAY_ACTIVE | state;
         }
-        place = macrocell_advance(frame.grid, ray, result.place);
+        place = macrocell_advance(
+            frame.grid, ray, macrocell_step(ray, place.block, result.place.event));
     }
     return RAY_DONE;
 }

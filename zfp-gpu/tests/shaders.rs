@@ -64,8 +64,8 @@ fn parameters_lie_where_the_host_writes_them() {
 }
 
 #[test]
-fn only_one_to_three_cache_pages_exist() {
-    for pages in [0, 4] {
+fn only_one_to_four_cache_pages_exist() {
+    for pages in [0, 5] {
         assert!(Decode::source(pages).is_err(), "{pages} cache pages");
     }
 }

@@ -12,10 +12,11 @@ struct MacrocellGrid {
     pad1: u32,
 }
 
-// Where a walk stands: `cell` was reached by `event`.
+// Where a walk stands: `block` was reached by `event`. Block planes are a subset of all planes, so the
+// walk from block to block needs no cells; macrocell_first_cell gives one where it is wanted.
 struct MacrocellPlace {
     event: DdaEvent,
-    cell: vec3<i32>,
+    block: vec3<i32>,
 }
 
 fn macrocell_linear(position: vec3<i32>, size: vec3<u32>) -> u32 {

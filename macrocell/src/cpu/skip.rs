@@ -1,4 +1,5 @@
-//! Twin of `shader/lib/macrocell_skip.wgsl`: advancing to the next active block.
+//! Twin of `shader/lib/macrocell_skip.wgsl`: advancing to the next active block. The shader goes from
+//! block to block where the twin goes by cells: the blocks and the crossings are the same.
 
 use super::dda::{CellBox, Event, Ray, START};
 use crate::Grid;

@@ -36,17 +36,17 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     var count = 0u;
     if (dda_meets(ray, volume)) {
         let entry = dda_entry(ray, volume);
-        var place = MacrocellPlace(entry, dda_cell_after(ray, entry, volume));
+        var place = MacrocellPlace(entry, dda_cell_after(ray, entry, volume) >> vec3<u32>(2u));
         while (count < BLOCKS) {
             place = macrocell_advance(params.grid, ray, place);
-            if (!macrocell_inside(params.grid, place.cell)) {
+            if (!macrocell_inside(params.grid, place.block)) {
                 break;
             }
-            let cell = vec3<u32>(place.cell);
+            let cell = vec3<u32>(macrocell_first_cell(params.grid, ray, place));
             let packed_cell = cell.x | (cell.y << 10u) | (cell.z << 20u);
             visits[id.x].blocks[count] = vec2<u32>(packed_cell, bitcast<u32>(place.event.t));
             count++;
-            place = macrocell_leave(params.grid, ray, place, 2u);
+            place = macrocell_leave(params.grid, ray, place);
         }
     }
     visits[id.x].inverse = ray.inverse;

@@ -1,13 +1,21 @@
 // A ray's way through the dual cells of one block. The importing text supplies
 // fn block_take(need: u32) -> bool, whether the samples of the needed blocks are at hand (bit 0 the
-// block itself, bit n its plus-side neighbour n = x + 2y + 4z), and
-// fn block_sample(x: i32, y: i32, z: i32) -> f32, the sample at 0 ..= 4 on each axis from the block's first.
+// block itself, bit n its plus-side neighbour n = x + 2y + 4z),
+// fn block_sample(x: i32, y: i32, z: i32) -> f32, the sample at 0 ..= 4 on each axis from the block's first,
+// fn block_cell_is_empty(bit: u32) -> bool, whether the block's cell x + 4y + 16z is known to lie on one
+// side of the surface, and fn block_set_empty(bit: u32), which may remember that.
 #import cell
+
+// Where a ray stands inside a block: `cell` was reached by `event`.
+struct CellPlace {
+    event: DdaEvent,
+    cell: vec3<i32>,
+}
 
 struct BlockWalk {
     hit: bool,
     missing: bool,         // stopped at a cell with samples that are not at hand
-    place: MacrocellPlace, // the hit's cell and how it was entered, or the first cell after the block
+    place: CellPlace,      // the hit's cell and how it was entered, or the first cell after the block
     exit: DdaEvent,        // where the ray leaves the hit's cell
     corners: CellCorners,  // of the hit's cell
     bernstein: vec4<f32>,
@@ -25,10 +33,10 @@ fn block_cell_need(cell: vec3<i32>) -> u32 {
     return need;
 }
 
-// Blocks that the samples of all cells lie in that the ray visits in `box`.
-fn block_need(ray: DdaRay, start: MacrocellPlace, box: DdaBox) -> u32 {
+// Blocks that the samples of all cells lie in that the ray visits in `box` from `start` on.
+fn block_need(ray: DdaRay, start: vec3<i32>, box: DdaBox) -> u32 {
     var need = 0u;
-    var cell = start.cell;
+    var cell = start;
     while (all(cell >= box.low) && all(cell <= box.high)) {
         need |= block_cell_need(cell);
         cell = block_next(ray, cell, dda_exit(ray, DdaBox(cell, cell)));
@@ -54,39 +62,39 @@ fn block_corners(cell: vec3<i32>, isovalue: f32) -> CellCorners {
     return CellCorners(low - vec4<f32>(isovalue), high - vec4<f32>(isovalue));
 }
 
-fn block_walk(ray: DdaRay, start: MacrocellPlace, box: DdaBox, isovalue: f32) -> BlockWalk {
+// Walks from `start` to the first crossing in `box`, to missing samples, or out of the box.
+fn block_walk(ray: DdaRay, start: CellPlace, box: DdaBox, isovalue: f32) -> BlockWalk {
     var walk: BlockWalk;
     walk.place = start;
-    var inside = false;
-    var inside_known = false;
     while (all(walk.place.cell >= box.low) && all(walk.place.cell <= box.high)) {
         let cell = walk.place.cell;
-        if (!block_take(block_cell_need(cell))) {
-            walk.missing = true;
-            return walk;
-        }
+        let bit = u32((cell.x & 3) | ((cell.y & 3) << 2u) | ((cell.z & 3) << 4u));
         walk.exit = dda_exit(ray, DdaBox(cell, cell));
-        walk.corners = block_corners(cell, isovalue);
-        if (cell_all_inside(walk.corners)) {
-            inside = true;
-        } else if (cell_all_outside(walk.corners)) {
-            inside = false;
-        } else {
-            walk.bernstein = cell_bernstein(
-                walk.corners,
-                cell_local(ray, walk.place.event, cell),
-                cell_local(ray, walk.exit, cell),
-            );
-            walk.inside_low = select(walk.bernstein.x >= 0.0, inside, inside_known);
-            inside = walk.bernstein.w >= 0.0;
-            walk.bracket = cell_first_crossing(walk.bernstein, walk.inside_low, inside);
-            if (walk.bracket.found) {
-                walk.hit = true;
+        if (!block_cell_is_empty(bit)) {
+            if (!block_take(block_cell_need(cell))) {
+                walk.missing = true;
                 return walk;
             }
+            walk.corners = block_corners(cell, isovalue);
+            if (cell_on_one_side(walk.corners)) {
+                block_set_empty(bit);
+            } else {
+                walk.bernstein = cell_bernstein(
+                    walk.corners,
+                    cell_local(ray, walk.place.event, cell),
+                    cell_local(ray, walk.exit, cell),
+                );
+                // The neighbours compute these sides from the same four samples in the same way.
+                walk.inside_low = walk.bernstein.x >= 0.0;
+                walk.bracket = cell_first_crossing(
+                    walk.bernstein, walk.inside_low, walk.bernstein.w >= 0.0);
+                if (walk.bracket.found) {
+                    walk.hit = true;
+                    return walk;
+                }
+            }
         }
-        inside_known = true;
-        walk.place = MacrocellPlace(walk.exit, block_next(ray, cell, walk.exit));
+        walk.place = CellPlace(walk.exit, block_next(ray, cell, walk.exit));
     }
     return walk;
 }

@@ -27,12 +27,11 @@ fn cell_mix(a: f32, b: f32, w: f32) -> f32 {
     return a * (1.0 - w) + b * w;
 }
 
-fn cell_all_inside(corners: CellCorners) -> bool {
-    return all(corners.low >= vec4<f32>(0.0)) && all(corners.high >= vec4<f32>(0.0));
-}
-
-fn cell_all_outside(corners: CellCorners) -> bool {
-    return all(corners.low < vec4<f32>(0.0)) && all(corners.high < vec4<f32>(0.0));
+// Whether all corners are inside or all are outside.
+fn cell_on_one_side(corners: CellCorners) -> bool {
+    let low = corners.low >= vec4<f32>(0.0);
+    let high = corners.high >= vec4<f32>(0.0);
+    return (all(low) && all(high)) || !(any(low) || any(high));
 }
 
 // Coordinates in [0, 1]^3 of the ray at `event`; exact on the event's own axis.

@@ -93,13 +93,11 @@ pub fn block_walk(
     sample: &impl Fn([i32; 3]) -> f32,
 ) -> BlockWalk {
     let mut place = start;
-    let mut known = None;
     while bounds.contains(place.cell) {
         let step = step(ray, place, isovalue, sample);
         if let Some(bernstein) = step.bernstein {
-            let inside_low = known.unwrap_or(step.inside_low);
-            if let Some(bracket) = cell::first_crossing(bernstein, inside_low, step.inside_high) {
-                let Step { exit, corners, .. } = step;
+            let Step { exit, corners, inside_low, inside_high, .. } = step;
+            if let Some(bracket) = cell::first_crossing(bernstein, inside_low, inside_high) {
                 return BlockWalk::Hit(Crossing {
                     place,
                     exit,
@@ -110,7 +108,6 @@ pub fn block_walk(
                 });
             }
         }
-        known = Some(step.inside_high);
         place = Place { event: step.exit, cell: next(ray, place.cell, step.exit) };
     }
     BlockWalk::Left(place)
