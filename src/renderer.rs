@@ -309,7 +309,7 @@ impl ProgressiveIsoRenderer {
             let _span =
                 tracing::debug_span!("progressive_iso.round", round = state.rounds).entered();
             let (stages, cache, decode) = (&self.stages, &self.cache, &self.decode);
-            let Picture { rays, rounds, .. } = &mut self.picture;
+            let Picture { rays, rounds, .. } = &self.picture;
             rounds.record_round(encoder, &stages.rays, rays, &mut |encoder| {
                 {
                     let _span = tracing::trace_span!("lru_cache_gpu.service").entered();
@@ -346,7 +346,7 @@ impl ProgressiveIsoRenderer {
         let lru = self.plan.cache.params();
         let params = state.view.params(grid, lru, isovalue, frame.options.look_ahead);
         let shading = ShadingParams::new(&frame.options.shading, self.volume.world_from_index);
-        let Picture { rays, rounds, .. } = &mut self.picture;
+        let Picture { rays, rounds, .. } = &self.picture;
         stages.rays.record_start(device, encoder, &mut self.upload, rays, &params, &shading);
         rounds.record_start(encoder, &stages.rays, rays);
         if let (Some(draw), Some(buffers)) = (&stages.draw, &self.picture.draw) {

@@ -6,9 +6,8 @@
 
 @group(0) @binding(0) var<uniform> frame: FrameParams;
 @group(0) @binding(1) var<storage, read_write> rays: array<u32>;
-@group(0) @binding(2) var<storage, read> active_rays: array<u32>;
-@group(0) @binding(3) var<storage, read> masks: array<vec2<u32>>;
-@group(0) @binding(4) var<storage, read_write> pairs: array<u32>;
+@group(0) @binding(2) var<storage, read> masks: array<vec2<u32>>;
+@group(0) @binding(3) var<storage, read_write> pairs: array<u32>;
 
 fn macrocell_mask(index: u32) -> vec2<u32> {
     return masks[index];
@@ -41,10 +40,10 @@ fn main(
     @builtin(local_invocation_index) lane: u32,
 ) {
     let index = indirect_linear_group(group, groups) * 64u + lane;
-    if (index >= rays[RAYS_ACTIVE]) {
+    if (index >= rays[RAYS_LISTED]) {
         return;
     }
-    let id = active_rays[index];
+    let id = rays[frame_list_word(frame, index)];
     let ray = frame_ray(frame, frame_pixel(frame, id)).ray;
     let block = frame_block_position(frame, rays[RAYS_HEADER + id] & RAY_BLOCK);
 #ifdef EMPTY_SPACE_STEP

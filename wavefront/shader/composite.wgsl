@@ -6,8 +6,7 @@
 
 @group(0) @binding(0) var<uniform> frame: FrameParams;
 @group(0) @binding(1) var<storage, read_write> rays: array<u32>;
-@group(0) @binding(2) var<storage, read> active_rays: array<u32>;
-@group(0) @binding(3) var<storage, read_write> pairs: array<u32>;
+@group(0) @binding(2) var<storage, read_write> pairs: array<u32>;
 
 @compute @workgroup_size(64)
 fn main(
@@ -16,7 +15,7 @@ fn main(
     @builtin(local_invocation_index) lane: u32,
 ) {
     let index = indirect_linear_group(group, groups) * 64u + lane;
-    if (index >= rays[RAYS_ACTIVE]) {
+    if (index >= rays[RAYS_LISTED]) {
         return;
     }
     let count = pairs[PAIRS_SPECULATION];
@@ -28,7 +27,7 @@ fn main(
         let status = pair & PAIR_STATUS;
         if (status != PAIR_READY) {
             let state = select(RAY_ACTIVE, RAY_HIT, status == PAIR_HIT);
-            rays[RAYS_HEADER + active_rays[index]] = state | (pair & PAIR_BLOCK);
+            rays[RAYS_HEADER + rays[frame_list_word(frame, index)]] = state | (pair & PAIR_BLOCK);
             return;
         }
     }

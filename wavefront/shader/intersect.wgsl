@@ -8,7 +8,7 @@
 #import block_walk
 
 @group(0) @binding(0) var<uniform> frame: FrameParams;
-@group(0) @binding(1) var<storage, read> active_rays: array<u32>;
+@group(0) @binding(1) var<storage, read> rays: array<u32>;
 @group(0) @binding(2) var<storage, read_write> pairs: array<u32>;
 @group(0) @binding(3) var<storage, read> visible: array<u32>;  // slots, and at the end their number
 @group(0) @binding(4) var<storage, read> slot_ends: array<u32>;
@@ -54,7 +54,7 @@ fn load_vertex(position: vec3<i32>, i: u32) -> f32 {
 }
 
 fn intersect(pair: u32, position: vec3<i32>) {
-    let id = active_rays[pair / pairs[PAIRS_SPECULATION]];
+    let id = rays[frame_list_word(frame, pair / pairs[PAIRS_SPECULATION])];
     let ray = frame_ray(frame, frame_pixel(frame, id)).ray;
     let box = dda_box(position * 4, 2u, frame.grid.last_cell);
     let entry = dda_entry(ray, box);

@@ -1,4 +1,4 @@
-// Turns every new hit into parameter, normal and colour, and marks which rays stay active. All
+// Turns every new hit into parameter, normal and colour, and takes finished rays off the active ones. All
 // strategies share this kernel, so that their pictures are equal bit for bit.
 #import frame
 #import indirect
@@ -10,15 +10,13 @@
 @group(0) @binding(0) var<uniform> frame: FrameParams;
 @group(0) @binding(1) var<uniform> shading: ShadingParams;
 @group(0) @binding(2) var<storage, read_write> rays: array<atomic<u32>>;
-@group(0) @binding(3) var<storage, read> active_rays: array<u32>;
-@group(0) @binding(4) var<storage, read_write> keep: array<u32>;
-@group(0) @binding(5) var<storage, read> lru_directory: array<u32>;
-@group(0) @binding(6) var<storage, read> lru_slots_0: array<f32>;
+@group(0) @binding(3) var<storage, read> lru_directory: array<u32>;
+@group(0) @binding(4) var<storage, read> lru_slots_0: array<f32>;
 #ifdef LRU_PAGES_2
-@group(0) @binding(7) var<storage, read> lru_slots_1: array<f32>;
+@group(0) @binding(5) var<storage, read> lru_slots_1: array<f32>;
 #endif
 #ifdef LRU_PAGES_3
-@group(0) @binding(8) var<storage, read> lru_slots_2: array<f32>;
+@group(0) @binding(6) var<storage, read> lru_slots_2: array<f32>;
 #endif
 @group(0) @binding(COLOR_BINDING) var color_out: texture_storage_2d<rgba8unorm, write>;
 #ifdef OUTPUT_DEPTH
@@ -82,11 +80,13 @@ fn main(
     }
     workgroupBarrier();
     let index = indirect_linear_group(group, groups) * 64u + lane;
-    if (index < atomicLoad(&rays[RAYS_ACTIVE])) {
-        let id = active_rays[index];
+    if (index < atomicLoad(&rays[RAYS_LISTED])) {
+        let id = atomicLoad(&rays[frame_list_word(frame, index)]);
         let state = atomicLoad(&rays[RAYS_HEADER + id]);
         let status = state & RAY_STATUS;
-        keep[index] = u32(status == RAY_ACTIVE);
+        if (status != RAY_ACTIVE) {
+            atomicAnd(&rays[frame_active_word(frame, id)], ~(1u << (id & 31u)));
+        }
         if (status == RAY_HIT) {
             resolve(id, state & RAY_BLOCK);
             atomicStore(&rays[RAYS_HEADER + id], RAY_DONE | RAY_HIT);

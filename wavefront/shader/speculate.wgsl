@@ -16,7 +16,7 @@ struct SpeculateParams {
 
 @compute @workgroup_size(1)
 fn main() {
-    let rays_active = rays[RAYS_ACTIVE];
+    let rays_active = rays[RAYS_LISTED];
     let speculation = clamp(params.capacity / max(rays_active, 1u), 1u, params.most);
     pairs[PAIRS_SPECULATION] = speculation;
     pairs[PAIRS_COUNT] = rays_active * speculation;

@@ -1,4 +1,4 @@
-// Starts a frame: every ray's first block, the list of the rays that enter the volume, cleared outputs.
+// Starts a frame: every ray's first block, a bit for those that enter the volume, cleared outputs.
 #import frame
 #import indirect
 #import outputs
@@ -6,9 +6,7 @@
 @group(0) @binding(0) var<uniform> frame: FrameParams;
 @group(0) @binding(1) var<uniform> shading: ShadingParams;
 @group(0) @binding(2) var<storage, read_write> rays: array<atomic<u32>>;
-@group(0) @binding(3) var<storage, read_write> all_rays: array<u32>;
-@group(0) @binding(4) var<storage, read_write> keep: array<u32>;
-@group(0) @binding(5) var color_out: texture_storage_2d<rgba8unorm, write>;
+@group(0) @binding(3) var color_out: texture_storage_2d<rgba8unorm, write>;
 #ifdef OUTPUT_DEPTH
 @group(0) @binding(DEPTH_BINDING) var depth_out: texture_storage_2d<r32float, write>;
 #endif
@@ -19,7 +17,7 @@
 @group(0) @binding(STATUS_BINDING) var status_out: texture_storage_2d<r32uint, write>;
 #endif
 
-var<workgroup> entered_count: atomic<u32>;
+var<workgroup> entered_bits: array<atomic<u32>, 2>;
 
 // The ray's first state: waiting in the block where it enters the volume, or done.
 fn first_state(ray: DdaRay) -> u32 {
@@ -37,29 +35,25 @@ fn main(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    if (lane == 0u) {
-        atomicStore(&entered_count, 0u);
+    if (lane < 2u) {
+        atomicStore(&entered_bits[lane], 0u);
     }
     workgroupBarrier();
     let id = indirect_linear_group(group, groups) * 64u + lane;
-    let count = frame.width * frame.height;
-    if (id < count) {
-        let pixel = frame_pixel(frame, id);
+    let pixel = frame_pixel(frame, id);
+    if (id < frame.ray_numbers && pixel.x < frame.width && pixel.y < frame.height) {
         let state = first_state(frame_ray(frame, pixel).ray);
         let entered = state != RAY_DONE;
         atomicStore(&rays[RAYS_HEADER + id], state);
-        all_rays[id] = id;
-        keep[id] = u32(entered);
         outputs_write_empty(pixel, entered);
         if (entered) {
-            atomicAdd(&entered_count, 1u);
+            atomicOr(&entered_bits[lane >> 5u], 1u << (lane & 31u));
         }
     }
     workgroupBarrier();
-    if (lane == 0u && id < count) {
-        atomicAdd(&rays[RAYS_ENTERED], atomicLoad(&entered_count));
-    }
-    if (id == 0u) {
-        atomicStore(&rays[RAYS_ACTIVE], count);
+    if ((lane & 31u) == 0u && id < frame.ray_numbers) {
+        let bits = atomicLoad(&entered_bits[lane >> 5u]);
+        atomicStore(&rays[frame_active_word(frame, id)], bits);
+        atomicAdd(&rays[RAYS_ENTERED], countOneBits(bits));
     }
 }

@@ -9,16 +9,15 @@
 
 @group(0) @binding(0) var<uniform> frame: FrameParams;
 @group(0) @binding(1) var<storage, read_write> rays: array<u32>;
-@group(0) @binding(2) var<storage, read> active_rays: array<u32>;
-@group(0) @binding(3) var<storage, read> masks: array<vec2<u32>>;
-@group(0) @binding(4) var<storage, read_write> lru_directory: array<atomic<u32>>;
-@group(0) @binding(5) var<storage, read_write> lru_state: array<atomic<u32>>;
-@group(0) @binding(6) var<storage, read> lru_slots_0: array<f32>;
+@group(0) @binding(2) var<storage, read> masks: array<vec2<u32>>;
+@group(0) @binding(3) var<storage, read_write> lru_directory: array<atomic<u32>>;
+@group(0) @binding(4) var<storage, read_write> lru_state: array<atomic<u32>>;
+@group(0) @binding(5) var<storage, read> lru_slots_0: array<f32>;
 #ifdef LRU_PAGES_2
-@group(0) @binding(7) var<storage, read> lru_slots_1: array<f32>;
+@group(0) @binding(6) var<storage, read> lru_slots_1: array<f32>;
 #endif
 #ifdef LRU_PAGES_3
-@group(0) @binding(8) var<storage, read> lru_slots_2: array<f32>;
+@group(0) @binding(7) var<storage, read> lru_slots_2: array<f32>;
 #endif
 
 fn lru_params() -> LruParams {
@@ -110,10 +109,10 @@ fn main(
     @builtin(local_invocation_index) lane: u32,
 ) {
     let index = indirect_linear_group(group, groups) * 64u + lane;
-    if (index >= rays[RAYS_ACTIVE]) {
+    if (index >= rays[RAYS_LISTED]) {
         return;
     }
-    let id = active_rays[index];
+    let id = rays[frame_list_word(frame, index)];
     let ray = frame_ray(frame, frame_pixel(frame, id)).ray;
     let block = frame_block_position(frame, rays[RAYS_HEADER + id] & RAY_BLOCK);
     rays[RAYS_HEADER + id] = walk(ray, block, index == 0u);

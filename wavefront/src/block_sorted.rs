@@ -150,7 +150,7 @@ impl BlockSorted {
     /// Texts and bindings of the kernels.
     pub fn sources(slot_pages: u32) -> [KernelSource; 8] {
         let pairs = Binding::StorageReadWrite { min_bytes: 4 * (PAIRS_HEADER_WORDS + 2) };
-        let advance = vec![FRAME_PARAMS, RAYS, READ, MASKS, pairs];
+        let advance = vec![FRAME_PARAMS, RAYS, MASKS, pairs];
         let grouping = vec![FRAME_PARAMS, pairs, READ, WRITE];
         let mut intersect = vec![FRAME_PARAMS, READ, pairs, READ, READ, READ];
         intersect.extend(vec![SLOTS; slot_pages as usize]);
@@ -167,7 +167,7 @@ impl BlockSorted {
             text("wavefront.count", COUNT, grouping.clone(), &[]),
             text("wavefront.scatter", SCATTER, grouping, &[]),
             text("wavefront.intersect", INTERSECT, intersect, &[]),
-            text("wavefront.composite", COMPOSITE, vec![FRAME_PARAMS, RAYS, READ, pairs], &[]),
+            text("wavefront.composite", COMPOSITE, vec![FRAME_PARAMS, RAYS, pairs], &[]),
         ]
     }
 }
@@ -190,17 +190,11 @@ struct BlockSortedRounds {
     mark: wgpu::BindGroup,
     count: wgpu::BindGroup,
     scatter: wgpu::BindGroup,
-    sides: [Side; 2],
-    _constants: [Buffer; 3],
-}
-
-/// What reads one of the two active lists.
-#[derive(Debug)]
-struct Side {
     skip: wgpu::BindGroup,
     advance: wgpu::BindGroup,
     intersect: wgpu::BindGroup,
     composite: wgpu::BindGroup,
+    _constants: [Buffer; 3],
 }
 
 impl Strategy for BlockSorted {
@@ -275,23 +269,19 @@ impl BlockSortedRounds {
         };
         let (frame, states) = (rays.frame(), rays.rays());
         let (directory, state) = (cache.directory(), cache.state());
-        let sides = rays.lists().map(|list| {
-            let advance = [frame, states, list, masks, &pairs];
-            let mut intersect =
-                resources(&[frame, list, &pairs, &visible, &slot_counts, directory]);
-            intersect.extend(cache.slots().iter().map(|page| page.as_entire_binding()));
-            Side {
-                skip: bind(&kernels.skip, &advance),
-                advance: bind(&kernels.advance, &advance),
-                intersect: kernels.intersect.bind(device, "wavefront.intersect", &intersect),
-                composite: bind(&kernels.composite, &[frame, states, list, &pairs]),
-            }
-        });
+        let advance = [frame, states, masks, &*pairs];
+        let mut intersect =
+            resources(&[frame, states, &pairs, &visible, &slot_counts, directory]);
+        intersect.extend(cache.slots().iter().map(|page| page.as_entire_binding()));
         Self {
             speculate: bind(&kernels.speculate, &[&speculate_params, states, &pairs]),
             mark: bind(&kernels.mark, &[frame, &pairs, directory, state]),
             count: bind(&kernels.count, &[frame, &pairs, directory, &slot_counts]),
             scatter: bind(&kernels.scatter, &[frame, &pairs, directory, &slot_counts]),
+            skip: bind(&kernels.skip, &advance),
+            advance: bind(&kernels.advance, &advance),
+            intersect: kernels.intersect.bind(device, "wavefront.intersect", &intersect),
+            composite: bind(&kernels.composite, &[frame, states, &pairs]),
             kernels,
             pairs,
             slot_counts,
@@ -303,7 +293,6 @@ impl BlockSortedRounds {
             group_args_bind,
             scan,
             compact,
-            sides,
             _constants: [slot_numbers, slot_count, speculate_params],
         }
     }
@@ -312,11 +301,10 @@ impl BlockSortedRounds {
     fn record_advance(&self, encoder: &mut wgpu::CommandEncoder, rays: &RayBuffers) {
         let _span = tracing::trace_span!("wavefront.advance").entered();
         let kernels = &self.kernels;
-        let side = &self.sides[rays.side()];
         {
             let mut pass = begin(encoder, "wavefront.advance");
             kernels.speculate.dispatch(&mut pass, &self.speculate, 1);
-            kernels.advance.dispatch_indirect(&mut pass, &side.advance, rays.args(), 0);
+            kernels.advance.dispatch_indirect(&mut pass, &self.advance, rays.args(), 0);
         }
         kernels.args.record(encoder, &self.pair_args_bind);
         let mut pass = begin(encoder, "wavefront.mark");
@@ -346,12 +334,11 @@ impl Rounds for BlockSortedRounds {
         &self,
         encoder: &mut wgpu::CommandEncoder,
         stage: &Rays,
-        rays: &mut RayBuffers,
+        rays: &RayBuffers,
     ) {
         {
             let mut pass = begin(encoder, "wavefront.skip");
-            let bind = &self.sides[rays.side()].skip;
-            self.kernels.skip.dispatch_indirect(&mut pass, bind, rays.args(), 0);
+            self.kernels.skip.dispatch_indirect(&mut pass, &self.skip, rays.args(), 0);
         }
         stage.record_resolve(encoder, rays);
     }
@@ -360,7 +347,7 @@ impl Rounds for BlockSortedRounds {
         &self,
         encoder: &mut wgpu::CommandEncoder,
         stage: &Rays,
-        rays: &mut RayBuffers,
+        rays: &RayBuffers,
         make_resident: MakeResident<'_>,
     ) {
         self.record_advance(encoder, rays);
@@ -368,11 +355,10 @@ impl Rounds for BlockSortedRounds {
         self.record_grouping(encoder);
         {
             let _span = tracing::trace_span!("wavefront.intersect").entered();
-            let side = &self.sides[rays.side()];
             let mut pass = begin(encoder, "wavefront.intersect");
             let kernels = &self.kernels;
-            kernels.intersect.dispatch_indirect(&mut pass, &side.intersect, &self.group_args, 0);
-            kernels.composite.dispatch_indirect(&mut pass, &side.composite, rays.args(), 0);
+            kernels.intersect.dispatch_indirect(&mut pass, &self.intersect, &self.group_args, 0);
+            kernels.composite.dispatch_indirect(&mut pass, &self.composite, rays.args(), 0);
         }
         stage.record_resolve(encoder, rays);
     }

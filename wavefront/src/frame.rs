@@ -5,6 +5,8 @@ use glam::{DMat4, DVec3, DVec4};
 use lru_cache_gpu::LruParams;
 use macrocell::Grid;
 
+use crate::order::RayOrder;
+use crate::plan::list_capacity;
 use crate::{Camera, Error};
 
 /// Uniform struct `MacrocellGrid` of `macrocell/shader/lib/macrocell_grid.wgsl`.
@@ -52,7 +54,11 @@ pub struct FrameParams {
     pub(crate) direction_dx: [f32; 3],
     pub(crate) look_ahead: u32,
     pub(crate) direction_dy: [f32; 3],
-    pub(crate) pad1: u32,
+    pub(crate) ray_numbers: u32,
+    pub(crate) ray_level: u32,
+    pub(crate) ray_columns: u32,
+    pub(crate) list_capacity: u32,
+    pub(crate) pad0: u32,
     pub(crate) grid: GridParams,
     pub(crate) lru: LruParams,
 }
@@ -133,6 +139,7 @@ impl FrameView {
         look_ahead: u32,
     ) -> FrameParams {
         let narrow = |v: DVec3| v.as_vec3().to_array();
+        let order = RayOrder::new(self.size);
         FrameParams {
             origin: narrow(self.origin[0]),
             isovalue,
@@ -145,7 +152,11 @@ impl FrameView {
             direction_dx: narrow(self.direction[1]),
             look_ahead: look_ahead.max(1),
             direction_dy: narrow(self.direction[2]),
-            pad1: 0,
+            ray_numbers: order.numbers() as u32,
+            ray_level: order.level(),
+            ray_columns: order.columns(),
+            list_capacity: list_capacity(self.size) as u32,
+            pad0: 0,
             grid: GridParams::new(grid),
             lru,
         }

@@ -20,7 +20,7 @@ macro_rules! members {
 }
 
 fn start_source() -> String {
-    let [start, _] = Rays::sources(Outputs { depth: true, normal: true, status: true }, 1);
+    let [start, ..] = Rays::sources(Outputs { depth: true, normal: true, status: true }, 1);
     start.wgsl.source
 }
 
@@ -39,7 +39,11 @@ fn frame_uniforms_have_the_declared_layout() {
         direction_dx,
         look_ahead,
         direction_dy,
-        pad1,
+        ray_numbers,
+        ray_level,
+        ray_columns,
+        list_capacity,
+        pad0,
         grid,
         lru,
     });

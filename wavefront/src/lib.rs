@@ -9,6 +9,7 @@ mod error;
 pub mod frame;
 #[cfg(test)]
 mod layout_tests;
+mod order;
 mod outputs;
 mod plan;
 mod rays;
@@ -22,6 +23,7 @@ pub use draw::{Draw, DrawBuffers, DrawTarget};
 pub use error::Error;
 pub use frame::{FrameParams, FrameView};
 pub use gpu_primitives::wgpu;
+pub use order::RayOrder;
 pub use outputs::{
     DEPTH_NONE, Light, OutputTextures, Outputs, PixelStatus, Shading, ShadingParams,
 };

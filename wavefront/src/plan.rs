@@ -1,17 +1,31 @@
 //! Sizes, before anything is allocated.
 
-use gpu_primitives::compact::Compact;
 use gpu_primitives::wgpu;
 
 use crate::frame::{FrameParams, PARAMS_BYTES};
 use crate::outputs::ShadingParams;
+use crate::order::RayOrder;
 use crate::{Error, Outputs};
 
 /// Words before the rays' states, as in `shader/lib/frame.wgsl`.
 pub(crate) const RAYS_HEADER_WORDS: u64 = 4;
 
-/// Bytes of the indirect arguments.
-pub(crate) const ARGS_BYTES: u64 = 16;
+/// Bytes of the indirect arguments of dispatches over the listed rays and over the list itself.
+pub(crate) const ARGS_BYTES: u64 = 32;
+
+/// Bytes of the indirect arguments of the list's second kernel.
+pub(crate) const FILL_ARGS_BYTES: u64 = 16;
+
+/// Words of active bits that one workgroup of the list's kernels takes.
+pub(crate) const LIST_WORDS_PER_GROUP: u64 = 256;
+
+/// Rays that the active list holds at most; the others wait for a later round.
+const MOST_LISTED: u64 = 1 << 21;
+
+/// Rays that the active list of a picture of `size` pixels holds.
+pub(crate) fn list_capacity(size: [u32; 2]) -> u64 {
+    (u64::from(size[0]) * u64::from(size[1])).min(MOST_LISTED)
+}
 
 /// Sizes of everything this crate allocates for pictures of one size.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -28,13 +42,15 @@ impl WavefrontPlan {
     pub fn new(size: [u32; 2], outputs: Outputs, limits: &wgpu::Limits) -> Result<Self, Error> {
         let [width, height] = size;
         let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        let most = binding / 4 - RAYS_HEADER_WORDS;
         let most_edge = limits.max_texture_dimension_2d;
-        let pixels = u64::from(width) * u64::from(height);
-        if pixels == 0 || pixels > most || width > most_edge || height > most_edge {
+        let plan = Self { size, outputs };
+        let fits = width > 0 && height > 0 && width <= most_edge && height <= most_edge;
+        if !fits || plan.state_bytes() > binding {
+            // About: what lies outside the picture in its last squares counts, too.
+            let most = (binding / 4).saturating_sub(MOST_LISTED) / 33 * 32;
             return Err(Error::PictureSize { width, height, most, most_edge });
         }
-        Ok(Self { size, outputs })
+        Ok(plan)
     }
 
     /// Width and height in pixels.
@@ -52,19 +68,28 @@ impl WavefrontPlan {
         u64::from(self.size[0]) * u64::from(self.size[1])
     }
 
+    /// Numbers of rays in their order; a few more than pixels.
+    pub(crate) fn numbers(&self) -> u64 {
+        RayOrder::new(self.size).numbers()
+    }
+
+    /// Header, states, active bits and active list.
     pub(crate) fn state_bytes(&self) -> u64 {
-        4 * (RAYS_HEADER_WORDS + self.rays())
+        let numbers = self.numbers();
+        4 * (RAYS_HEADER_WORDS + numbers + numbers / 32 + list_capacity(self.size))
     }
 
-    /// Bytes of ray states, both active lists, flags and the scratch memory of compaction.
+    /// Workgroups of the list's kernels.
+    pub(crate) fn list_groups(&self) -> u64 {
+        (self.numbers() / 32).div_ceil(LIST_WORDS_PER_GROUP)
+    }
+
+    /// Bytes of ray states, the active list and what makes it.
     pub fn ray_bytes(&self) -> u64 {
-        self.state_bytes() + 3 * 4 * self.rays() + self.scratch_bytes()
-    }
-
-    fn scratch_bytes(&self) -> u64 {
-        let args = gpu_primitives::indirect::IndirectArgs::BIND_BYTES + ARGS_BYTES;
-        2 * Compact::plan(self.rays()).bytes()
-            + args
+        self.state_bytes()
+            + 4 * self.list_groups()
+            + ARGS_BYTES
+            + FILL_ARGS_BYTES
             + PARAMS_BYTES
             + size_of::<ShadingParams>() as u64
     }

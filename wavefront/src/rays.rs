@@ -2,10 +2,9 @@
 //! by all strategies.
 
 use bytemuck::{Pod, Zeroable};
-use gpu_primitives::compact::{Compact, CompactBuffers};
-use gpu_primitives::indirect::{IndirectArgs, IndirectArgsBuffers};
 use gpu_primitives::kernel::{Binding, Kernel, KernelSource};
 use gpu_primitives::memory::{Buffer, Category, Ledger};
+use gpu_primitives::scan;
 use gpu_primitives::upload::UploadRing;
 use gpu_primitives::wgsl::{Constant, Module, compose_fixed};
 use gpu_primitives::{indirect, wgpu};
@@ -13,7 +12,7 @@ use lru_cache_gpu::CacheBuffers;
 
 use crate::frame::{FrameParams, PARAMS_BYTES};
 use crate::outputs::{OUTPUTS, OutputTextures, Outputs, ShadingParams};
-use crate::plan::{ARGS_BYTES, RAYS_HEADER_WORDS, WavefrontPlan};
+use crate::plan::{ARGS_BYTES, FILL_ARGS_BYTES, RAYS_HEADER_WORDS, WavefrontPlan};
 
 const FRAME: Module = Module { name: "frame", source: include_str!("../shader/lib/frame.wgsl") };
 const CELL: Module = Module { name: "cell", source: include_str!("../shader/lib/cell.wgsl") };
@@ -21,6 +20,7 @@ const BLOCK_WALK: Module =
     Module { name: "block_walk", source: include_str!("../shader/lib/block_walk.wgsl") };
 const BLOCK_SLOTS: Module =
     Module { name: "block_slots", source: include_str!("../shader/lib/block_slots.wgsl") };
+const LIST: Module = Module { name: "list", source: include_str!("../shader/list.wgsl") };
 const START: Module = Module { name: "start", source: include_str!("../shader/start.wgsl") };
 const RESOLVE: Module = Module { name: "resolve", source: include_str!("../shader/resolve.wgsl") };
 
@@ -50,7 +50,8 @@ pub struct Counters {
     pub entered: u32,
     /// Hits shaded.
     pub hits: u32,
-    pad: u32,
+    /// Active rays that the next round takes.
+    pub listed: u32,
 }
 
 impl Counters {
@@ -63,13 +64,13 @@ impl Counters {
 pub struct Rays {
     start: Kernel,
     resolve: Kernel,
-    compact: Compact,
-    args: IndirectArgs,
+    list_sum: Kernel,
+    list_fill: Kernel,
 }
 
 /// Every module that a kernel of this crate may import.
 pub(crate) fn library() -> Vec<Module> {
-    let mut modules = vec![FRAME, CELL, BLOCK_WALK, BLOCK_SLOTS, OUTPUTS, indirect::MODULE];
+    let mut modules = vec![FRAME, CELL, BLOCK_WALK, BLOCK_SLOTS, OUTPUTS, indirect::MODULE, scan::GROUP_MODULE];
     #[cfg(feature = "block-sorted")]
     modules.push(crate::block_sorted::PAIRS);
     modules.extend(macrocell::wgsl::MODULES);
@@ -100,19 +101,24 @@ pub(crate) fn source(
 impl Rays {
     /// Makes the pipelines for pictures with `outputs` and a cache of `slot_pages` pages.
     pub fn new(device: &wgpu::Device, outputs: Outputs, slot_pages: u32) -> Self {
-        let [start, resolve] = Self::sources(outputs, slot_pages).map(|s| s.kernel(device));
-        Self { start, resolve, compact: Compact::new(device), args: IndirectArgs::new(device) }
+        let [start, resolve, list_sum, list_fill] =
+            Self::sources(outputs, slot_pages).map(|s| s.kernel(device));
+        Self { start, resolve, list_sum, list_fill }
     }
 
     /// Texts and bindings of the kernels.
-    pub fn sources(outputs: Outputs, slot_pages: u32) -> [KernelSource; 2] {
+    pub fn sources(outputs: Outputs, slot_pages: u32) -> [KernelSource; 4] {
         let shading = Binding::Uniform { bytes: size_of::<ShadingParams>() as u64 };
-        let start = vec![FRAME_PARAMS, shading, RAYS, WRITE, WRITE];
-        let mut resolve = vec![FRAME_PARAMS, shading, RAYS, READ, WRITE, READ];
+        let start = vec![FRAME_PARAMS, shading, RAYS];
+        let mut resolve = vec![FRAME_PARAMS, shading, RAYS, READ];
         resolve.extend(vec![SLOTS; slot_pages as usize]);
+        let list = vec![FRAME_PARAMS, RAYS, WRITE, WRITE];
+        let fill = [("LIST_FILL", Constant::Bool(true))];
         [
             source("wavefront.start", START, start, slot_pages, &[], Some(outputs)),
             source("wavefront.resolve", RESOLVE, resolve, slot_pages, &[], Some(outputs)),
+            source("wavefront.list.sum", LIST, list.clone(), slot_pages, &[], None),
+            source("wavefront.list.fill", LIST, list, slot_pages, &fill, None),
         ]
     }
 
@@ -122,67 +128,53 @@ impl Rays {
         device: &wgpu::Device,
         encoder: &mut wgpu::CommandEncoder,
         upload: &mut UploadRing,
-        buffers: &mut RayBuffers,
+        buffers: &RayBuffers,
         frame: &FrameParams,
         shading: &ShadingParams,
     ) {
         upload.write(device, encoder, &buffers.frame, 0, bytemuck::bytes_of(frame));
         upload.write(device, encoder, &buffers.shading, 0, bytemuck::bytes_of(shading));
         encoder.clear_buffer(&buffers.rays, 0, Some(4 * RAYS_HEADER_WORDS));
-        {
-            let mut pass = begin(encoder, "wavefront.start");
-            let groups = buffers.plan.rays().div_ceil(u64::from(RAYS_PER_GROUP));
-            self.start.dispatch(&mut pass, &buffers.start, groups);
-        }
-        // The kernel lists all rays in the second list; compaction puts those that enter into the first.
-        buffers.side = 1;
-        self.record_compaction(encoder, buffers);
+        let mut pass = begin(encoder, "wavefront.start");
+        let groups = buffers.plan.numbers() / u64::from(RAYS_PER_GROUP);
+        self.start.dispatch(&mut pass, &buffers.start, groups);
+        let groups = buffers.plan.list_groups();
+        self.list_sum.dispatch(&mut pass, &buffers.list_sum, groups);
+        self.list_fill.dispatch(&mut pass, &buffers.list_fill, groups);
     }
 
     /// Records the shading of new hits and the new list of active rays: the end of every round.
     /// Blocks with hits must still be resident.
-    pub(crate) fn record_resolve(
-        &self,
-        encoder: &mut wgpu::CommandEncoder,
-        buffers: &mut RayBuffers,
-    ) {
+    pub(crate) fn record_resolve(&self, encoder: &mut wgpu::CommandEncoder, buffers: &RayBuffers) {
         let _span = tracing::trace_span!("wavefront.resolve").entered();
         {
             let mut pass = begin(encoder, "wavefront.resolve");
-            let side = &buffers.sides[buffers.side];
-            self.resolve.dispatch_indirect(&mut pass, &side.resolve, &buffers.args, 0);
+            self.resolve.dispatch_indirect(&mut pass, &buffers.resolve, &buffers.args, 0);
         }
-        self.record_compaction(encoder, buffers);
-    }
-
-    fn record_compaction(&self, encoder: &mut wgpu::CommandEncoder, buffers: &mut RayBuffers) {
-        self.compact.record(encoder, &buffers.sides[buffers.side].compact);
-        buffers.side = 1 - buffers.side;
-        self.args.record(encoder, &buffers.args_bind);
+        let mut pass = begin(encoder, "wavefront.list");
+        let (sum, fill) = (&buffers.list_sum, &buffers.list_fill);
+        self.list_sum.dispatch_indirect(&mut pass, sum, &buffers.args, LIST_ARGS_OFFSET);
+        self.list_fill.dispatch_indirect(&mut pass, fill, &buffers.fill_args, 0);
     }
 }
 
-/// Ray states, active lists and scratch memory of one picture.
+/// Where the arguments of the list's first kernel are in [`RayBuffers::args`].
+const LIST_ARGS_OFFSET: u64 = 16;
+
+/// Ray states, the active list and scratch memory of one picture.
 #[derive(Debug)]
 pub struct RayBuffers {
     plan: WavefrontPlan,
     rays: Buffer,
-    lists: [Buffer; 2],
     frame: Buffer,
     shading: Buffer,
     args: Buffer,
-    args_bind: IndirectArgsBuffers,
+    fill_args: Buffer,
     start: wgpu::BindGroup,
-    sides: [Side; 2],
-    side: usize,
-    _keep: Buffer,
-}
-
-/// What reads one of the two active lists.
-#[derive(Debug)]
-struct Side {
     resolve: wgpu::BindGroup,
-    compact: CompactBuffers,
+    list_sum: wgpu::BindGroup,
+    list_fill: wgpu::BindGroup,
+    _sums: Buffer,
 }
 
 impl RayBuffers {
@@ -204,57 +196,41 @@ impl RayBuffers {
         };
         let usage = Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST;
         let rays = buffer(Category::Rays, "wavefront.rays", plan.state_bytes(), usage);
-        let list = |label| buffer(Category::Rays, label, 4 * plan.rays(), Usage::STORAGE);
-        let lists = [list("wavefront.active_0"), list("wavefront.active_1")];
-        let keep = list("wavefront.keep");
+        let sums = 4 * plan.list_groups();
+        let sums = buffer(Category::Scratch, "wavefront.list.sums", sums, Usage::STORAGE);
         let uniform = Usage::UNIFORM | Usage::COPY_DST;
         let frame = buffer(Category::Params, "wavefront.frame", PARAMS_BYTES, uniform);
         let shading_bytes = size_of::<ShadingParams>() as u64;
         let shading = buffer(Category::Params, "wavefront.shading", shading_bytes, uniform);
-        let args_usage = Usage::STORAGE | Usage::INDIRECT;
-        let args = buffer(Category::Scratch, "wavefront.args", ARGS_BYTES, args_usage);
-        let args_bind = stage.args.bind(device, ledger, (&rays, 0), RAYS_PER_GROUP, (&args, 0));
+        let args = |label, bytes| {
+            buffer(Category::Scratch, label, bytes, Usage::STORAGE | Usage::INDIRECT)
+        };
+        let fill_args = args("wavefront.list.fill_args", FILL_ARGS_BYTES);
+        let args = args("wavefront.args", ARGS_BYTES);
         let views = || textures.views().iter().map(wgpu::BindingResource::TextureView);
-        let mut start = resources(&[&frame, &shading, &rays, &lists[1], &keep]);
+        let mut start = resources(&[&frame, &shading, &rays]);
         start.extend(views());
-        let start = stage.start.bind(device, "wavefront.start", &start);
-        let compact_plan = Compact::plan(plan.rays());
-        let sides = [0, 1].map(|i| {
-            let (here, there, count) = (&lists[i], &lists[1 - i], (&*rays, 0));
-            let mut resolve = resources(&[&frame, &shading, &rays, here, &keep, cache.directory()]);
-            resolve.extend(cache.slots().iter().map(|page| page.as_entire_binding()));
-            resolve.extend(views());
-            let resolve = stage.resolve.bind(device, "wavefront.resolve", &resolve);
-            let stage = &stage.compact;
-            let compact = CompactBuffers::new(
-                device,
-                ledger,
-                stage,
-                &compact_plan,
-                &keep,
-                here,
-                count,
-                there,
-                count,
-            );
-            Side { resolve, compact }
-        });
+        let mut resolve = resources(&[&frame, &shading, &rays, cache.directory()]);
+        resolve.extend(cache.slots().iter().map(|page| page.as_entire_binding()));
+        resolve.extend(views());
+        let sum = resources(&[&frame, &rays, &sums, &fill_args]);
+        let fill = resources(&[&frame, &rays, &sums, &args]);
         Self {
+            start: stage.start.bind(device, "wavefront.start", &start),
+            resolve: stage.resolve.bind(device, "wavefront.resolve", &resolve),
+            list_sum: stage.list_sum.bind(device, "wavefront.list.sum", &sum),
+            list_fill: stage.list_fill.bind(device, "wavefront.list.fill", &fill),
             plan: plan.clone(),
             rays,
-            lists,
             frame,
             shading,
             args,
-            args_bind,
-            start,
-            sides,
-            side: 0,
-            _keep: keep,
+            fill_args,
+            _sums: sums,
         }
     }
 
-    /// Header and states of the rays, as in `shader/lib/frame.wgsl`.
+    /// Header, states, active bits and list of the rays, as in `shader/lib/frame.wgsl`.
     pub fn rays(&self) -> &wgpu::Buffer {
         &self.rays
     }
@@ -269,17 +245,7 @@ impl RayBuffers {
         &self.frame
     }
 
-    /// Both active lists.
-    pub(crate) fn lists(&self) -> [&wgpu::Buffer; 2] {
-        [&self.lists[0], &self.lists[1]]
-    }
-
-    /// Which of the lists holds the active rays now.
-    pub(crate) fn side(&self) -> usize {
-        self.side
-    }
-
-    /// Arguments of a dispatch over the active rays.
+    /// Arguments of a dispatch over the listed rays.
     pub(crate) fn args(&self) -> &wgpu::Buffer {
         &self.args
     }

@@ -8,7 +8,7 @@ use gpu_primitives::wgpu;
 use gpu_primitives::wgsl::Module;
 
 use crate::rays::{
-    FRAME_PARAMS, MASKS, RAYS, READ, RayBuffers, Rays, SLOTS, WRITE, begin, resources, source,
+    FRAME_PARAMS, MASKS, RAYS, RayBuffers, Rays, SLOTS, WRITE, begin, resources, source,
 };
 use crate::strategy::{MakeResident, Rounds, Scene, Strategy};
 
@@ -20,11 +20,11 @@ pub struct RunAhead {
     walk: Arc<Kernel>,
 }
 
-/// One bind group for each active list; the strategy allocates nothing.
+/// The strategy allocates nothing.
 #[derive(Debug)]
 struct RunAheadRounds {
     walk: Arc<Kernel>,
-    binds: [wgpu::BindGroup; 2],
+    bind: wgpu::BindGroup,
 }
 
 impl RunAhead {
@@ -35,7 +35,7 @@ impl RunAhead {
 
     /// Text and bindings of the kernel.
     pub fn source(slot_pages: u32) -> KernelSource {
-        let mut bindings = vec![FRAME_PARAMS, RAYS, READ, MASKS, WRITE, WRITE];
+        let mut bindings = vec![FRAME_PARAMS, RAYS, MASKS, WRITE, WRITE];
         bindings.extend(vec![SLOTS; slot_pages as usize]);
         source("wavefront.walk", WALK, bindings, slot_pages, &[], None)
     }
@@ -44,33 +44,29 @@ impl RunAhead {
 impl Strategy for RunAhead {
     fn bind(&self, device: &wgpu::Device, _ledger: &Ledger, scene: Scene<'_>) -> Box<dyn Rounds> {
         let Scene { rays, masks, cache } = scene;
-        let binds = rays.lists().map(|list| {
-            let (directory, state) = (cache.directory(), cache.state());
-            let mut bindings =
-                resources(&[rays.frame(), rays.rays(), list, masks, directory, state]);
-            bindings.extend(cache.slots().iter().map(|page| page.as_entire_binding()));
-            self.walk.bind(device, "wavefront.walk", &bindings)
-        });
-        Box::new(RunAheadRounds { walk: Arc::clone(&self.walk), binds })
+        let (directory, state) = (cache.directory(), cache.state());
+        let mut bindings = resources(&[rays.frame(), rays.rays(), masks, directory, state]);
+        bindings.extend(cache.slots().iter().map(|page| page.as_entire_binding()));
+        let bind = self.walk.bind(device, "wavefront.walk", &bindings);
+        Box::new(RunAheadRounds { walk: Arc::clone(&self.walk), bind })
     }
 }
 
 impl Rounds for RunAheadRounds {
-    fn record_start(&self, _: &mut wgpu::CommandEncoder, _: &Rays, _: &mut RayBuffers) {}
+    fn record_start(&self, _: &mut wgpu::CommandEncoder, _: &Rays, _: &RayBuffers) {}
 
     /// A walk of the active rays, the shading of new hits, then what serves the requests.
     fn record_round(
         &self,
         encoder: &mut wgpu::CommandEncoder,
         stage: &Rays,
-        rays: &mut RayBuffers,
+        rays: &RayBuffers,
         make_resident: MakeResident<'_>,
     ) {
         {
             let _span = tracing::trace_span!("wavefront.walk").entered();
             let mut pass = begin(encoder, "wavefront.walk");
-            let bind = &self.binds[rays.side()];
-            self.walk.dispatch_indirect(&mut pass, bind, rays.args(), 0);
+            self.walk.dispatch_indirect(&mut pass, &self.bind, rays.args(), 0);
         }
         stage.record_resolve(encoder, rays);
         make_resident(encoder);

@@ -31,14 +31,14 @@ pub type MakeResident<'a> = &'a mut dyn FnMut(&mut wgpu::CommandEncoder);
 /// A strategy at work on one picture.
 pub trait Rounds: Debug {
     /// Records what a new frame needs before its first round, once its rays have started.
-    fn record_start(&self, encoder: &mut wgpu::CommandEncoder, stage: &Rays, rays: &mut RayBuffers);
+    fn record_start(&self, encoder: &mut wgpu::CommandEncoder, stage: &Rays, rays: &RayBuffers);
 
     /// Records one round.
     fn record_round(
         &self,
         encoder: &mut wgpu::CommandEncoder,
         stage: &Rays,
-        rays: &mut RayBuffers,
+        rays: &RayBuffers,
         make_resident: MakeResident<'_>,
     );
 

@@ -16,7 +16,11 @@ struct FrameParams {
     direction_dx: vec3<f32>,
     look_ahead: u32, // RunAhead: active blocks that a stopped ray requests, the missing one included
     direction_dy: vec3<f32>,
-    pad1: u32,
+    ray_numbers: u32,   // a multiple of 64; those outside the picture have no ray
+    ray_level: u32,     // edge of the squares of the rays' order, as a power of two of tiles
+    ray_columns: u32,   // squares in a row
+    list_capacity: u32, // rays that the active list holds
+    pad0: u32,
     grid: MacrocellGrid,
     lru: LruParams,
 }
@@ -41,14 +45,38 @@ const RAY_DONE: u32 = 0x80000000u;   // final
 const RAY_STATUS: u32 = 0xc0000000u;
 const RAY_BLOCK: u32 = 0x3fffffffu;
 
-// Words before the rays' states.
-const RAYS_ACTIVE: u32 = 0u;   // length of the active list
+// The rays' buffer: these words, a state for every number, a bit for every number whose ray is active,
+// and the active list: the numbers of the first active rays.
+const RAYS_ACTIVE: u32 = 0u;   // active rays
 const RAYS_ENTERED: u32 = 1u;  // rays that enter the volume
 const RAYS_HITS: u32 = 2u;     // hits shaded so far
+const RAYS_LISTED: u32 = 3u;   // length of the active list
 const RAYS_HEADER: u32 = 4u;
 
+// The word that holds the active bit of a ray, which is its number's lowest five bits.
+fn frame_active_word(frame: FrameParams, ray: u32) -> u32 {
+    return RAYS_HEADER + frame.ray_numbers + (ray >> 5u);
+}
+
+fn frame_list_word(frame: FrameParams, index: u32) -> u32 {
+    return RAYS_HEADER + frame.ray_numbers + frame.ray_numbers / 32u + index;
+}
+
+// Bits 0, 2, 4, .. of both components, put together.
+fn frame_even_bits(code: vec2<u32>) -> vec2<u32> {
+    var v = code & vec2<u32>(0x55555555u);
+    v = (v | (v >> vec2<u32>(1u))) & vec2<u32>(0x33333333u);
+    v = (v | (v >> vec2<u32>(2u))) & vec2<u32>(0x0f0f0f0fu);
+    return (v | (v >> vec2<u32>(4u))) & vec2<u32>(0x00ff00ffu);
+}
+
+// The pixel of a ray; outside the picture for numbers that have no ray.
 fn frame_pixel(frame: FrameParams, ray: u32) -> vec2<u32> {
-    return vec2<u32>(ray % frame.width, ray / frame.width);
+    let bits = 2u * (3u + frame.ray_level);
+    let square = ray >> bits;
+    let code = ray & ((1u << bits) - 1u);
+    let corner = vec2<u32>(square % frame.ray_columns, square / frame.ray_columns);
+    return corner * (8u << frame.ray_level) + frame_even_bits(vec2<u32>(code, code >> 1u));
 }
 
 fn frame_block_position(frame: FrameParams, block: u32) -> vec3<i32> {

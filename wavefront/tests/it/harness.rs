@@ -197,7 +197,7 @@ impl Stage {
         let words: Vec<u32> =
             masks.words.iter().flat_map(|&w| [w as u32, (w >> 32) as u32]).collect();
         let masks = self.buffer(&words);
-        let mut rays = RayBuffers::new(device, &ledger, &self.rays, &wavefront, &cache, &textures);
+        let rays = RayBuffers::new(device, &ledger, &self.rays, &wavefront, &cache, &textures);
         let scene = Scene { rays: &rays, masks: &masks, cache: &cache };
         let rounds = self.run_ahead.bind(device, &ledger, scene);
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
@@ -211,9 +211,9 @@ impl Stage {
         let identity = glam::DMat4::IDENTITY.to_cols_array_2d();
         let shading = ShadingParams::new(&Shading::default(), identity);
         let mut upload = UploadRing::new(&ledger, "test", 1024);
-        self.rays.record_start(device, &mut encoder, &mut upload, &mut rays, &params, &shading);
-        rounds.record_start(&mut encoder, &self.rays, &mut rays);
-        rounds.record_round(&mut encoder, &self.rays, &mut rays, &mut |_| {});
+        self.rays.record_start(device, &mut encoder, &mut upload, &rays, &params, &shading);
+        rounds.record_start(&mut encoder, &self.rays, &rays);
+        rounds.record_round(&mut encoder, &self.rays, &rays, &mut |_| {});
         gpu::submit_and_wait(device, &self.queue, encoder);
         let active = gpu::read_u32s(device, &self.queue, rays.rays())[0];
         assert_eq!(active, 0, "one round finishes every ray");

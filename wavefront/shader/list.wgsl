@@ -1,0 +1,91 @@
+// The list of the active rays, in the order of their numbers, from one bit per ray: active rays per
+// group of 256 words, then the list. One invocation per word of 32 bits.
+#import frame
+#import indirect
+#import scan_group
+
+@group(0) @binding(0) var<uniform> frame: FrameParams;
+@group(0) @binding(1) var<storage, read_write> rays: array<u32>;
+@group(0) @binding(2) var<storage, read_write> sums: array<u32>;
+#ifdef LIST_FILL
+// Arguments of a dispatch over the listed rays, and of LIST_SUM.
+@group(0) @binding(3) var<storage, read_write> args: array<u32>;
+#else
+// Arguments of LIST_FILL.
+@group(0) @binding(3) var<storage, read_write> fill_args: array<u32>;
+#endif
+
+fn list_groups() -> u32 {
+    return indirect_div_ceil(frame.ray_numbers / 32u, SCAN_LANES);
+}
+
+// Bits of the active rays in a word.
+fn list_word(word: u32) -> u32 {
+    if (word >= frame.ray_numbers / 32u) {
+        return 0u;
+    }
+    return rays[frame_active_word(frame, word * 32u)];
+}
+
+#ifdef LIST_FILL
+fn write_args(active_count: u32) {
+    let listed = min(active_count, frame.list_capacity);
+    rays[RAYS_ACTIVE] = active_count;
+    rays[RAYS_LISTED] = listed;
+    let walk = indirect_fold((listed + 63u) / 64u);
+    args[0] = walk.x;
+    args[1] = walk.y;
+    args[2] = walk.z;
+    // Nothing changes any more when no ray is active.
+    let again = indirect_fold(select(0u, list_groups(), active_count > 0u));
+    args[4] = again.x;
+    args[5] = again.y;
+    args[6] = again.z;
+}
+
+@compute @workgroup_size(SCAN_LANES)
+fn main(
+    @builtin(workgroup_id) group_id: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let group = indirect_linear_group(group_id, groups);
+    // Group 0, which has nothing before it, sums up everything.
+    let end = select(group, list_groups(), group == 0u);
+    var part = 0u;
+    for (var i = lane; i < end; i += SCAN_LANES) {
+        part += sums[i];
+    }
+    let summed = scan_group(lane, part).total;
+    if (group == 0u && lane == 0u) {
+        write_args(summed);
+    }
+    let word = group * SCAN_LANES + lane;
+    var bits = list_word(word);
+    var at = select(summed, 0u, group == 0u) + scan_group(lane, countOneBits(bits)).before;
+    while (bits != 0u && at < frame.list_capacity) {
+        rays[frame_list_word(frame, at)] = word * 32u + countTrailingZeros(bits);
+        bits &= bits - 1u;
+        at++;
+    }
+}
+#else
+@compute @workgroup_size(SCAN_LANES)
+fn main(
+    @builtin(workgroup_id) group_id: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let group = indirect_linear_group(group_id, groups);
+    let sum = scan_group(lane, countOneBits(list_word(group * SCAN_LANES + lane)));
+    if (lane == 0u && group < list_groups()) {
+        sums[group] = sum.total;
+    }
+    if (lane == 0u && group == 0u) {
+        let again = indirect_fold(list_groups());
+        fill_args[0] = again.x;
+        fill_args[1] = again.y;
+        fill_args[2] = again.z;
+    }
+}
+#endif
