@@ -3,6 +3,7 @@
 
 #import indirect
 #import zfp_group
+#import zfp_store
 
 struct DecodeParams {
     slots_per_page: u32,
@@ -18,15 +19,15 @@ struct DecodeParams {
 @group(0) @binding(3) var<storage, read> jobs: array<vec2<u32>>;
 @group(0) @binding(4) var<storage, read> job_count: array<u32>;
 // A slot is 16 rows of four samples along x.
-@group(0) @binding(5) var<storage, read_write> cache_0: array<vec4<f32>>;
-#ifdef CACHE_PAGES_2
-@group(0) @binding(6) var<storage, read_write> cache_1: array<vec4<f32>>;
+@group(0) @binding(5) var<storage, read_write> zfp_slots_0: array<vec4<f32>>;
+#ifdef ZFP_SLOT_PAGES_2
+@group(0) @binding(6) var<storage, read_write> zfp_slots_1: array<vec4<f32>>;
 #endif
-#ifdef CACHE_PAGES_3
-@group(0) @binding(7) var<storage, read_write> cache_2: array<vec4<f32>>;
+#ifdef ZFP_SLOT_PAGES_3
+@group(0) @binding(7) var<storage, read_write> zfp_slots_2: array<vec4<f32>>;
 #endif
-#ifdef CACHE_PAGES_4
-@group(0) @binding(8) var<storage, read_write> cache_3: array<vec4<f32>>;
+#ifdef ZFP_SLOT_PAGES_4
+@group(0) @binding(8) var<storage, read_write> zfp_slots_3: array<vec4<f32>>;
 #endif
 
 fn zfp_word(index: u32) -> u32 {
@@ -37,31 +38,6 @@ fn zfp_word(index: u32) -> u32 {
 var<workgroup> job_slots: array<u32, ZFP_GROUP_BLOCKS>;
 
 const NO_SLOT: u32 = 0xffffffffu;
-
-fn store_row(slot: u32, row: u32, samples: vec4<f32>) {
-    let cache_page = slot / params.slots_per_page;
-    let index = (slot - cache_page * params.slots_per_page) * 16u + row;
-    switch cache_page {
-#ifdef CACHE_PAGES_2
-        case 1u: {
-            cache_1[index] = samples;
-        }
-#endif
-#ifdef CACHE_PAGES_3
-        case 2u: {
-            cache_2[index] = samples;
-        }
-#endif
-#ifdef CACHE_PAGES_4
-        case 3u: {
-            cache_3[index] = samples;
-        }
-#endif
-        default: {
-            cache_0[index] = samples;
-        }
-    }
-}
 
 // First phase: one invocation reads the planes of a job's block.
 fn read_job(index: u32, lane: u32) {
@@ -94,9 +70,11 @@ fn decode(
     for (var turn = 0u; turn < 4u; turn++) {
         let block = turn * ZFP_GROUP_AT_ONCE + (lane >> 3u);
         let row = lane & 7u;
-        if job_slots[block] != NO_SLOT {
-            store_row(job_slots[block], row, zfp_group_row(block, row));
-            store_row(job_slots[block], row + 8u, zfp_group_row(block, row + 8u));
+        let slot = job_slots[block];
+        if slot != NO_SLOT {
+            let per_page = params.slots_per_page;
+            zfp_store_row(slot, per_page, row, zfp_group_row(block, row));
+            zfp_store_row(slot, per_page, row + 8u, zfp_group_row(block, row + 8u));
         }
     }
 }

@@ -1,14 +1,18 @@
-// Least and greatest samples of the blocks of a region, in eight classes, 32 blocks per workgroup.
+// Least and greatest samples of the blocks of a region, in eight classes, 32 blocks per workgroup. With
+// KEEP_SAMPLES the samples are kept, too: block b in slot b.
 
 #import indirect
 #import zfp_group
+#ifdef KEEP_SAMPLES
+#import zfp_store
+#endif
 
 struct ExtremaParams {
     // First block of the region, in block coordinates; w: unused.
     origin: vec4<u32>,
     // Blocks of the region per axis; w: number of them.
     size: vec4<u32>,
-    // Samples of the volume per axis; w: unused.
+    // Samples of the volume per axis; w: slots per page of slots.
     dims: vec4<u32>,
 }
 
@@ -17,6 +21,22 @@ struct ExtremaParams {
 @group(0) @binding(2) var<storage, read> payload: array<u32>;
 // (min, max) of kind c of the region's block e at element e * 8 + c.
 @group(0) @binding(3) var<storage, read_write> extrema: array<vec2<f32>>;
+#ifdef KEEP_SAMPLES
+@group(0) @binding(4) var<storage, read_write> zfp_slots_0: array<vec4<f32>>;
+#ifdef ZFP_SLOT_PAGES_2
+@group(0) @binding(5) var<storage, read_write> zfp_slots_1: array<vec4<f32>>;
+#endif
+#ifdef ZFP_SLOT_PAGES_3
+@group(0) @binding(6) var<storage, read_write> zfp_slots_2: array<vec4<f32>>;
+#endif
+#ifdef ZFP_SLOT_PAGES_4
+@group(0) @binding(7) var<storage, read_write> zfp_slots_3: array<vec4<f32>>;
+#endif
+// Block of each of the group's blocks that the region keeps, else NO_SLOT.
+var<workgroup> kept_slots: array<u32, ZFP_GROUP_BLOCKS>;
+
+const NO_SLOT: u32 = 0xffffffffu;
+#endif
 
 const EXTREMA_LARGEST: f32 = 3.40282346638528859812e38f;
 
@@ -32,6 +52,9 @@ var<workgroup> rows: array<vec3<f32>, 128>;
 // First phase: one invocation reads the planes of the region's block number `element`.
 fn read_element(element: u32, lane: u32) {
     extents[lane] = 0u;
+#ifdef KEEP_SAMPLES
+    kept_slots[lane] = NO_SLOT;
+#endif
     zfp_group_leave_out(lane);
     if element >= min(params.size.w, arrayLength(&extrema) / 8u) {
         return;
@@ -50,6 +73,12 @@ fn read_element(element: u32, lane: u32) {
     }
     let extent = min(params.dims.xyz - 4u * position, vec3<u32>(4u));
     extents[lane] = extent.x | (extent.y << 4u) | (extent.z << 8u);
+#ifdef KEEP_SAMPLES
+    // The last layers belong to the next regions, which decode them again.
+    if all(local + vec3<u32>(1u) < params.size.xyz) {
+        kept_slots[lane] = block + page.first_block;
+    }
+#endif
     zfp_group_read(lane, zfp_locate(page, block), page.bits_per_block);
 }
 
@@ -57,6 +86,11 @@ fn read_element(element: u32, lane: u32) {
 fn row_extrema(block: u32, row: u32) -> vec3<f32> {
     let extent = extents[block];
     let samples = zfp_group_row(block, row);
+#ifdef KEEP_SAMPLES
+    if kept_slots[block] != NO_SLOT {
+        zfp_store_row(kept_slots[block], params.dims.w, row, samples);
+    }
+#endif
     if (row & 3u) >= ((extent >> 4u) & 15u) || (row >> 2u) >= (extent >> 8u) {
         return vec3<f32>(EXTREMA_LARGEST, -EXTREMA_LARGEST, 0.0);
     }

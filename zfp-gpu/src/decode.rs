@@ -3,7 +3,7 @@
 use gpu_primitives::indirect;
 use gpu_primitives::kernel::{Binding, Kernel, KernelSource, window};
 use gpu_primitives::memory::{Buffer, Category, Ledger};
-use gpu_primitives::wgsl::{Constant, Module, compose_fixed};
+use gpu_primitives::wgsl::{Module, compose_fixed};
 
 use crate::plan::PAGE_PARAM_BYTES;
 use crate::{Error, Payload, wgsl};
@@ -11,7 +11,7 @@ use crate::{Error, Payload, wgsl};
 const DECODE: Module = Module { name: "decode", source: include_str!("../shader/decode.wgsl") };
 
 /// Most cache pages that one dispatch can bind beside its inputs.
-const MAX_CACHE_PAGES: u32 = 4;
+pub(crate) const MAX_CACHE_PAGES: u32 = 4;
 
 /// Bytes of a slot: 64 samples.
 pub const SLOT_BYTES: u64 = 256;
@@ -55,11 +55,6 @@ impl Decode {
             let expected = format!("1 to {MAX_CACHE_PAGES}");
             return Err(Error::CachePages { expected, found: cache_pages as usize });
         }
-        let constants = [
-            ("CACHE_PAGES_2", Constant::Bool(cache_pages >= 2)),
-            ("CACHE_PAGES_3", Constant::Bool(cache_pages >= 3)),
-            ("CACHE_PAGES_4", Constant::Bool(cache_pages >= 4)),
-        ];
         let mut bindings = vec![
             Binding::Uniform { bytes: PAGE_PARAM_BYTES },
             Binding::Uniform { bytes: DecodeBuffers::BYTES },
@@ -70,7 +65,11 @@ impl Decode {
         bindings.extend((0..cache_pages).map(|_| Binding::StorageReadWrite { min_bytes: 16 }));
         Ok(KernelSource {
             label: "zfp-gpu.decode",
-            wgsl: compose_fixed(DECODE, &[indirect::MODULE, wgsl::BLOCK, wgsl::GROUP], &constants),
+            wgsl: compose_fixed(
+                DECODE,
+                &[indirect::MODULE, wgsl::BLOCK, wgsl::GROUP, wgsl::STORE],
+                &wgsl::slot_page_constants(cache_pages),
+            ),
             entry_point: "decode",
             bindings,
         })

@@ -4,8 +4,9 @@ use gpu_primitives::indirect;
 use gpu_primitives::kernel::{Binding, Kernel, KernelSource};
 use gpu_primitives::memory::{Buffer, Category, Ledger};
 use gpu_primitives::upload::UploadRing;
-use gpu_primitives::wgsl::{Module, compose_fixed};
+use gpu_primitives::wgsl::{Constant, Module, compose_fixed};
 
+use crate::decode::{MAX_CACHE_PAGES, SLOT_BYTES};
 use crate::plan::PAGE_PARAM_BYTES;
 use crate::{Error, Payload, StreamLayout, wgsl};
 
@@ -18,9 +19,21 @@ const EXTREMA: Module = Module { name: "extrema", source: include_str!("../shade
 /// bit 1 those with y = 0, bit 2 those with z = 0, so that a cell's neighbours on the plus side can
 /// contribute just the face, edge or corner that the cell shares with them. Only samples inside the
 /// volume count. Blocks outside the volume are left untouched.
+///
+/// It may keep the samples, too: block b in slot b of slots laid out as [`crate::Decode`] does.
 #[derive(Debug)]
 pub struct BlockExtrema {
     kernel: Kernel,
+    slot_pages: u32,
+}
+
+/// Where a [`BlockExtrema`] stage keeps samples.
+#[derive(Clone, Copy, Debug)]
+pub struct KeptSamples<'a> {
+    /// Pages with a slot for every block of the volume, as many as the stage was made for.
+    pub pages: &'a [Buffer],
+    /// Slots of every page but the last, which may be shorter.
+    pub slots_per_page: u32,
 }
 
 /// What a [`BlockExtrema`] stage reads and writes: a bind group per payload page.
@@ -32,6 +45,7 @@ pub struct ExtremaBuffers {
     /// First block and number of blocks of every payload page.
     pages: Vec<(u64, u64)>,
     output_bytes: u64,
+    slots_per_page: u32,
 }
 
 impl BlockExtrema {
@@ -41,26 +55,39 @@ impl BlockExtrema {
     /// Blocks per workgroup.
     const BLOCKS_PER_GROUP: u32 = 32;
 
-    /// Makes the pipeline.
-    #[must_use]
-    pub fn new(device: &wgpu::Device) -> Self {
-        Self { kernel: Self::source().kernel(device) }
+    /// Makes the pipeline. With `slot_pages` of 1 to 4 it keeps the samples, with 0 it does not.
+    ///
+    /// # Errors
+    /// [`Error::CachePages`] for any other number of pages.
+    pub fn new(device: &wgpu::Device, slot_pages: u32) -> Result<Self, Error> {
+        Ok(Self { kernel: Self::source(slot_pages)?.kernel(device), slot_pages })
     }
 
     /// Text and bindings of the kernel.
-    #[must_use]
-    pub fn source() -> KernelSource {
-        KernelSource {
-            label: "zfp-gpu.extrema",
-            wgsl: compose_fixed(EXTREMA, &[indirect::MODULE, wgsl::BLOCK, wgsl::GROUP], &[]),
-            entry_point: "block_extrema",
-            bindings: vec![
-                Binding::Uniform { bytes: PAGE_PARAM_BYTES },
-                Binding::Uniform { bytes: ExtremaBuffers::BYTES },
-                Binding::StorageRead { min_bytes: 4 },
-                Binding::StorageReadWrite { min_bytes: 8 },
-            ],
+    ///
+    /// # Errors
+    /// As [`BlockExtrema::new`].
+    pub fn source(slot_pages: u32) -> Result<KernelSource, Error> {
+        if slot_pages > MAX_CACHE_PAGES {
+            let expected = format!("0 to {MAX_CACHE_PAGES}");
+            return Err(Error::CachePages { expected, found: slot_pages as usize });
         }
+        let mut constants = vec![("KEEP_SAMPLES", Constant::Bool(slot_pages > 0))];
+        constants.extend(wgsl::slot_page_constants(slot_pages));
+        let library = [indirect::MODULE, wgsl::BLOCK, wgsl::GROUP, wgsl::STORE];
+        let mut bindings = vec![
+            Binding::Uniform { bytes: PAGE_PARAM_BYTES },
+            Binding::Uniform { bytes: ExtremaBuffers::BYTES },
+            Binding::StorageRead { min_bytes: 4 },
+            Binding::StorageReadWrite { min_bytes: 8 },
+        ];
+        bindings.extend((0..slot_pages).map(|_| Binding::StorageReadWrite { min_bytes: 16 }));
+        Ok(KernelSource {
+            label: "zfp-gpu.extrema",
+            wgsl: compose_fixed(EXTREMA, &library, &constants),
+            entry_point: "block_extrema",
+            bindings,
+        })
     }
 
     /// Records the extrema of the region of blocks `region_origin ..+ region_size`, one dispatch
@@ -94,7 +121,7 @@ impl BlockExtrema {
         };
         let ([ox, oy, oz], [sx, sy, sz]) = (region_origin, region_size);
         let [nx, ny, nz] = buffers.layout.dims;
-        let params = [ox, oy, oz, 0, sx, sy, sz, count, nx, ny, nz, 0];
+        let params = [ox, oy, oz, 0, sx, sy, sz, count, nx, ny, nz, buffers.slots_per_page];
         upload.write(device, encoder, &buffers.params, 0, bytemuck::bytes_of(&params));
         let mut pass = gpu_primitives::profile::begin_pass(encoder, "zfp-gpu.extrema");
         for (bind, &(page_first, page_blocks)) in buffers.binds.iter().zip(&buffers.pages) {
@@ -112,17 +139,20 @@ impl ExtremaBuffers {
     pub const BYTES: u64 = 48;
 
     /// Binds a payload and the output, a storage buffer of [`BlockExtrema::BYTES_PER_BLOCK`] bytes
-    /// for every block of the largest region.
+    /// for every block of the largest region. `kept` is for a stage that keeps samples.
     ///
     /// # Errors
-    /// [`Error::BufferTooSmall`] when the output does not hold one block.
+    /// [`Error::BufferTooSmall`] when the output does not hold one block or the slots do not hold
+    /// every block, [`Error::CachePages`] when there are not as many pages as the stage writes.
     pub fn new(
         device: &wgpu::Device,
         ledger: &Ledger,
         stage: &BlockExtrema,
         payload: &Payload,
         output: &wgpu::Buffer,
+        kept: Option<KeptSamples<'_>>,
     ) -> Result<Self, Error> {
+        check_kept(stage, payload.layout(), kept)?;
         if output.size() < BlockExtrema::BYTES_PER_BLOCK {
             return Err(Error::BufferTooSmall {
                 what: "the output of the extrema",
@@ -141,12 +171,14 @@ impl ExtremaBuffers {
             },
         );
         let bind = |page: &crate::payload::Page| {
-            let resources = [
+            let mut resources = vec![
                 page.params.as_entire_binding(),
                 params.as_entire_binding(),
                 page.words.as_entire_binding(),
                 output.as_entire_binding(),
             ];
+            let slots = kept.iter().flat_map(|kept| kept.pages);
+            resources.extend(slots.map(|page| page.as_entire_binding()));
             stage.kernel.bind(device, "zfp-gpu.extrema", &resources)
         };
         let blocks = |page: &crate::PayloadPage| (page.first_block.into(), page.blocks.into());
@@ -156,8 +188,35 @@ impl ExtremaBuffers {
             layout: *payload.layout(),
             pages: payload.payload_plan().pages().iter().map(blocks).collect(),
             output_bytes: output.size(),
+            slots_per_page: kept.map_or(1, |kept| kept.slots_per_page),
         })
     }
+}
+
+fn check_kept(
+    stage: &BlockExtrema,
+    layout: &StreamLayout,
+    kept: Option<KeptSamples<'_>>,
+) -> Result<(), Error> {
+    let found = kept.map_or(0, |kept| kept.pages.len());
+    if found != stage.slot_pages as usize {
+        return Err(Error::CachePages { expected: stage.slot_pages.to_string(), found });
+    }
+    let Some(kept) = kept else { return Ok(()) };
+    let per_page = u64::from(kept.slots_per_page);
+    let blocks: u64 = layout.blocks().iter().map(|&b| u64::from(b)).product();
+    for (page, buffer) in (0u64..).zip(kept.pages) {
+        let slots = blocks.saturating_sub(page * per_page).min(per_page);
+        if buffer.size() < slots * SLOT_BYTES {
+            let (expected, found) = (slots * SLOT_BYTES, buffer.size());
+            return Err(Error::BufferTooSmall { what: "a page of kept samples", expected, found });
+        }
+    }
+    if per_page * (kept.pages.len() as u64) < blocks {
+        let (expected, found) = (blocks * SLOT_BYTES, per_page * found as u64 * SLOT_BYTES);
+        return Err(Error::BufferTooSmall { what: "the pages of kept samples", expected, found });
+    }
+    Ok(())
 }
 
 /// Least and greatest index of the volume's blocks inside a region; `None` if there are none.

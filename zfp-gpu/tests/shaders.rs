@@ -9,7 +9,8 @@ use zfp_gpu::{BlockExtrema, Decode};
 
 fn sources() -> Vec<KernelSource> {
     let decodes = (1..=4).map(|pages| Decode::source(pages).unwrap());
-    decodes.chain([BlockExtrema::source()]).collect()
+    let extrema = (0..=4).map(|pages| BlockExtrema::source(pages).unwrap());
+    decodes.chain(extrema).collect()
 }
 
 fn kind(binding: &Binding) -> BindingKind {
@@ -57,7 +58,7 @@ fn parameters_lie_where_the_host_writes_them() {
     let params =
         [("slots_per_page", 0, 4), ("slots", 4, 4), ("count_word", 8, 4), ("padding", 12, 4)];
     check_struct(&decode, "DecodeParams", &params).unwrap();
-    let extrema = BlockExtrema::source().wgsl.source;
+    let extrema = BlockExtrema::source(0).unwrap().wgsl.source;
     check_struct(&extrema, "ZfpPage", &page).unwrap();
     let params = [("origin", 0, 16), ("size", 16, 16), ("dims", 32, 16)];
     check_struct(&extrema, "ExtremaParams", &params).unwrap();
