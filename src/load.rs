@@ -3,7 +3,7 @@
 use gpu_primitives::memory::Ledger;
 use gpu_primitives::upload::UploadRing;
 use macrocell::{MacrocellPlan, RangeBuffers, RangeScratch, Ranges};
-use zfp_gpu::{BlockExtrema, ExtremaBuffers, Payload};
+use zfp_gpu::{BlockExtrema, ExtremaBuffers, KeptSamples, Payload};
 
 use crate::{CompressedVolume, Error, wgpu};
 
@@ -61,11 +61,14 @@ impl Loader {
         plan: LoadPlan,
         payload: &Payload,
         ranges: &RangeBuffers,
+        kept: Option<KeptSamples<'_>>,
     ) -> Result<Self, Error> {
-        let (range_stage, extrema_stage) = (Ranges::new(device), BlockExtrema::new(device));
+        let kept_pages = kept.map_or(0, |kept| kept.pages.len() as u32);
+        let range_stage = Ranges::new(device);
+        let extrema_stage = BlockExtrema::new(device, kept_pages)?;
         let scratch = RangeScratch::new(device, ledger, &range_stage, ranges);
         let extrema =
-            ExtremaBuffers::new(device, ledger, &extrema_stage, payload, scratch.extrema())?;
+            ExtremaBuffers::new(device, ledger, &extrema_stage, payload, scratch.extrema(), kept)?;
         Ok(Self {
             upload: UploadRing::new(ledger, "progressive-iso.load.upload", plan.chunk),
             chunk: plan.chunk,

@@ -15,6 +15,20 @@ pub enum TraversalStrategy {
     BlockSorted(wavefront::BlockSortedOptions),
 }
 
+/// Whether decoded samples are kept for the whole volume or for what rays see.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Residency {
+    /// [`Residency::Full`] where the strategy, the budget and the device's limits allow it, because
+    /// it is faster from the first picture on; else [`Residency::Cached`].
+    #[default]
+    Auto,
+    /// Blocks are decoded into a cache when rays need them.
+    Cached,
+    /// Every block is decoded once, at load. `RunAhead` only.
+    Full,
+}
+
 /// Choices that hold for the life of a renderer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RendererOptions {
@@ -30,6 +44,8 @@ pub struct RendererOptions {
     pub capture: bool,
     /// How rays find the surface.
     pub strategy: TraversalStrategy,
+    /// What is kept of the decoded volume.
+    pub residency: Residency,
 }
 
 impl Default for RendererOptions {
@@ -42,6 +58,7 @@ impl Default for RendererOptions {
             draw_target: None,
             capture: false,
             strategy: TraversalStrategy::RunAhead,
+            residency: Residency::Auto,
         }
     }
 }

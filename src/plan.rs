@@ -2,20 +2,26 @@
 
 use gpu_primitives::memory::Ledger;
 use gpu_primitives::readback::ReadbackRing;
-use lru_cache_gpu::CachePlan;
+use lru_cache_gpu::{CachePlan, ResidentPlan};
 use macrocell::{MacrocellPlan, Masks, RangeScratch};
 use wavefront::{DrawBuffers, WavefrontPlan};
 use zfp_gpu::{DecodeBuffers, ExtremaBuffers, PayloadPlan};
 
 use crate::load::LoadPlan;
 use crate::renderer::READBACK_BYTES;
-use crate::{CompressedVolume, Error, RendererOptions, TraversalStrategy, capture, wgpu};
+use crate::samples::SamplePlan;
+use crate::{
+    CompressedVolume, Error, RendererOptions, Residency, TraversalStrategy, capture, wgpu,
+};
 
 /// Passes that may be in flight.
 pub(crate) const PASSES_IN_FLIGHT: usize = 2;
 
 /// Largest upload chunk of a frame's parameters.
 pub(crate) const PARAMS_CHUNK: u64 = 1024;
+
+/// Most pages of slots of a volume that is resident as a whole: a walking kernel has 8 storage buffers.
+const MOST_SLOT_PAGES: u64 = 4;
 
 /// Staging memory of parameters: chunks of at most [`PARAMS_CHUNK`] bytes, two passes in flight.
 const PARAMS_STAGING: u64 = 128 << 10;
@@ -40,7 +46,7 @@ pub struct ScenePlan {
     pub(crate) payload: PayloadPlan,
     pub(crate) macrocell: MacrocellPlan,
     pub(crate) load: LoadPlan,
-    pub(crate) cache: CachePlan,
+    pub(crate) samples: SamplePlan,
     pub(crate) wavefront: WavefrontPlan,
     pub(crate) strategy: StrategyPlan,
     parts: Vec<Part>,
@@ -63,42 +69,26 @@ impl ScenePlan {
         let macrocell = MacrocellPlan::new(volume.dims(), limits)?;
         let outputs = options.all_outputs();
         let wavefront = WavefrontPlan::new(options.size, outputs, limits)?;
-        let budget_bytes = options.budget_bytes;
-        let blocks = macrocell.grid().block_count();
         let strategy = StrategyPlan::new(options.strategy, wavefront.rays(), limits)?;
-        let smallest_cache =
-            CachePlan::minimum_bytes(blocks) + strategy.bytes(CachePlan::least_slots(blocks));
-        let parts_with = |load: &LoadPlan| {
-            let parts = fixed_parts(options, &payload, &macrocell, load, &wavefront);
-            let bytes: u64 = parts.iter().map(|part| part.bytes).sum();
-            (parts, bytes)
-        };
-        let stream_bytes = payload.layout().stream_bytes();
-        let mut load = LoadPlan::new(stream_bytes, budget_bytes);
-        let (mut parts, mut fixed) = parts_with(&load);
-        if fixed + smallest_cache > budget_bytes {
-            // Staging grows with the budget, the minimum must not.
-            load = LoadPlan::smallest(stream_bytes);
-            (parts, fixed) = parts_with(&load);
+        let scene = Scene { options, payload, macrocell, wavefront, strategy, limits };
+        match options.residency {
+            Residency::Cached => scene.cached(),
+            Residency::Full => scene.resident(),
+            Residency::Auto if strategy.can_be_resident() => {
+                scene.resident().or_else(|_| scene.cached())
+            }
+            Residency::Auto => scene.cached(),
         }
-        let minimum = fixed + smallest_cache;
-        if minimum > budget_bytes {
-            return Err(Error::BudgetTooSmall { minimum, budget: budget_bytes });
-        }
-        let beside = |slots| strategy.bytes(slots);
-        let cache = CachePlan::fit_beside(blocks, budget_bytes - fixed, limits, beside)?;
-        parts.push(strategy.part(cache.slots()));
-        parts.push(cache_part(&cache, blocks));
-        Ok(Self { payload, macrocell, load, cache, wavefront, strategy, parts, budget_bytes })
     }
 
     /// The same scene with one pixel and the smallest cache, for the time of a change of size.
     pub(crate) fn shrunk(&self, limits: &wgpu::Limits) -> Result<Self, Error> {
         let blocks = self.blocks();
         let cache = CachePlan::fit(blocks, CachePlan::minimum_bytes(blocks), limits)?;
+        let samples = SamplePlan::Cached(cache);
         let wavefront = WavefrontPlan::new([1, 1], self.wavefront.outputs(), limits)?;
         let strategy = self.strategy.shrunk(limits)?;
-        Ok(Self { cache, wavefront, strategy, ..self.clone() })
+        Ok(Self { samples, wavefront, strategy, ..self.clone() })
     }
 
     /// The parts, in or left out.
@@ -119,10 +109,19 @@ impl ScenePlan {
         self.budget_bytes
     }
 
-    /// Slots of the block cache.
+    /// Blocks that can be resident at a time.
     #[must_use]
     pub fn slots(&self) -> u64 {
-        self.cache.slots()
+        self.samples.slots()
+    }
+
+    /// [`Residency::Cached`] or [`Residency::Full`].
+    #[must_use]
+    pub fn residency(&self) -> Residency {
+        match self.samples {
+            SamplePlan::Cached(_) => Residency::Cached,
+            SamplePlan::Resident(_) => Residency::Full,
+        }
     }
 
     /// Blocks of the volume.
@@ -148,6 +147,86 @@ impl ScenePlan {
     }
 }
 
+/// What a scene consists of, whatever is kept of its samples.
+struct Scene<'a> {
+    options: &'a RendererOptions,
+    payload: PayloadPlan,
+    macrocell: MacrocellPlan,
+    wavefront: WavefrontPlan,
+    strategy: StrategyPlan,
+    limits: &'a wgpu::Limits,
+}
+
+impl Scene<'_> {
+    /// The parts that do not depend on the samples, with their bytes. Staging grows with the budget
+    /// unless that leaves less than `rest` bytes.
+    fn fixed(&self, rest: u64) -> (LoadPlan, Vec<Part>, u64) {
+        let stream_bytes = self.payload.layout().stream_bytes();
+        let with = |load: LoadPlan| {
+            let parts =
+                fixed_parts(self.options, &self.payload, &self.macrocell, &load, &self.wavefront);
+            let bytes = parts.iter().map(|part| part.bytes).sum();
+            (load, parts, bytes)
+        };
+        let found = with(LoadPlan::new(stream_bytes, self.options.budget_bytes));
+        if found.2 + rest > self.options.budget_bytes {
+            return with(LoadPlan::smallest(stream_bytes));
+        }
+        found
+    }
+
+    fn cached(self) -> Result<ScenePlan, Error> {
+        let budget = self.options.budget_bytes;
+        let blocks = self.macrocell.grid().block_count();
+        let strategy = self.strategy;
+        let smallest =
+            CachePlan::minimum_bytes(blocks) + strategy.bytes(CachePlan::least_slots(blocks));
+        let (load, mut parts, fixed) = self.fixed(smallest);
+        let minimum = fixed + smallest;
+        if minimum > budget {
+            return Err(Error::BudgetTooSmall { minimum, budget });
+        }
+        let beside = |slots| strategy.bytes(slots);
+        let cache = CachePlan::fit_beside(blocks, budget - fixed, self.limits, beside)?;
+        parts.push(strategy.part(cache.slots()));
+        parts.push(cache_part(&cache, blocks));
+        parts.push(left_out("resident volume", "decoded on demand"));
+        Ok(self.plan(SamplePlan::Cached(cache), load, parts))
+    }
+
+    fn resident(&self) -> Result<ScenePlan, Error> {
+        let budget = self.options.budget_bytes;
+        if !self.strategy.can_be_resident() {
+            return Err(Error::Wavefront(wavefront::Error::NeedsCache));
+        }
+        let blocks = self.macrocell.grid().block_count();
+        let resident = ResidentPlan::new(blocks, self.limits, MOST_SLOT_PAGES)?;
+        let (load, mut parts, fixed) = self.fixed(resident.bytes());
+        let minimum = fixed + resident.bytes();
+        if minimum > budget {
+            return Err(Error::BudgetTooSmall { minimum, budget });
+        }
+        parts.push(self.strategy.part(blocks));
+        parts.push(left_out("cache", "every block is resident"));
+        let why = format!("{blocks} blocks, decoded at load");
+        parts.push(part("resident volume", resident.bytes(), why));
+        Ok(self.plan(SamplePlan::Resident(resident), load, parts))
+    }
+
+    fn plan(&self, samples: SamplePlan, load: LoadPlan, parts: Vec<Part>) -> ScenePlan {
+        ScenePlan {
+            payload: self.payload.clone(),
+            macrocell: self.macrocell.clone(),
+            load,
+            samples,
+            wavefront: self.wavefront.clone(),
+            strategy: self.strategy,
+            parts,
+            budget_bytes: self.options.budget_bytes,
+        }
+    }
+}
+
 /// What the chosen strategy allocates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum StrategyPlan {
@@ -169,6 +248,15 @@ impl StrategyPlan {
                 let plan = wavefront::BlockSortedPlan::new(rays, options, limits)?;
                 Ok(Self::BlockSorted(options, plan))
             }
+        }
+    }
+
+    /// Whether the strategy works on a volume that is resident as a whole.
+    fn can_be_resident(self) -> bool {
+        match self {
+            Self::RunAhead => true,
+            #[cfg(feature = "block-sorted")]
+            Self::BlockSorted(..) => false,
         }
     }
 

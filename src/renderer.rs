@@ -2,21 +2,23 @@
 
 use bytemuck::{Pod, Zeroable};
 use gpu_primitives::kernel::dispatches_recorded;
-use gpu_primitives::memory::{Buffer, Category, Ledger};
+use gpu_primitives::memory::{Category, Ledger};
 use gpu_primitives::readback::ReadbackRing;
 use gpu_primitives::upload::UploadRing;
-use lru_cache_gpu::CacheBuffers;
 use macrocell::{Masks, RangeBuffers};
 use wavefront::{FrameView, OutputTextures, ShadingParams, Statistics};
 use web_time::Instant;
-use zfp_gpu::{DecodeBuffers, Payload};
+use zfp_gpu::Payload;
 
 use crate::capture::PendingCapture;
 use crate::load::Loader;
 use crate::plan::{PARAMS_CHUNK, PASSES_IN_FLIGHT};
-use crate::stages::{Picture, Stages, cache};
+use crate::samples::SampleBuffers;
+use crate::stages::{Picture, Stages};
 use crate::timing::Timer;
-use crate::{CompressedVolume, Error, Frame, PassReport, RendererOptions, ScenePlan, wgpu};
+use crate::{
+    CompressedVolume, Error, Frame, PassReport, RendererOptions, Residency, ScenePlan, wgpu,
+};
 
 /// Largest size of an isovalue or a sample.
 const LARGEST_VALUE: f32 = 2.126_764_8e37; // 2^124
@@ -26,11 +28,12 @@ const LARGEST_VALUE: f32 = 2.126_764_8e37; // 2^124
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 struct PassRecord {
     rays: wavefront::Counters,
+    /// GPU clock ticks at the pass's begin and end, two words each; 0 without timestamps.
+    ticks: [u32; 4],
+    /// What follows is there with a cache only.
     cache: lru_cache_gpu::Counters,
     /// The cache's counters when the frame started.
     cache_before: lru_cache_gpu::Counters,
-    /// GPU clock ticks at the pass's begin and end, two words each; 0 without timestamps.
-    ticks: [u32; 4],
     statistics: Statistics,
 }
 
@@ -43,7 +46,7 @@ const PROFILE_BYTES: u64 = gpu_primitives::profile::Profiler::BYTES;
 #[cfg(not(feature = "wgpu-profiler"))]
 const PROFILE_BYTES: u64 = 0;
 
-/// Bytes of the counters kept since the frame's start and of the resolved timestamps.
+/// Bytes of the resolved timestamps and, with a cache, of the counters since the frame's start.
 pub(crate) const CONTROL_BYTES: u64 =
     lru_cache_gpu::Counters::BYTES.1 + Timer::BYTES + PROFILE_BYTES;
 
@@ -64,13 +67,11 @@ pub struct ProgressiveIsoRenderer {
     timer: Timer,
     #[cfg(feature = "wgpu-profiler")]
     profile: crate::timing::Profile,
-    cache_before: Buffer,
     payload: Payload,
     ranges: RangeBuffers,
     masks: Masks,
     loader: Option<Loader>,
-    cache: CacheBuffers,
-    decode: DecodeBuffers,
+    samples: SampleBuffers,
     picture: Picture,
     frame: Option<FrameState>,
     frame_count: u64,
@@ -127,19 +128,11 @@ impl ProgressiveIsoRenderer {
         let payload = Payload::new(device, &ledger, &plan.payload);
         let ranges = RangeBuffers::new(device, &ledger, &plan.macrocell);
         let masks = Masks::new(device, &ledger, &stages.activate, &ranges);
-        let loader = Loader::new(device, &ledger, plan.load, &payload, &ranges)?;
-        let (cache, decode) = cache(device, &ledger, &stages, &plan, &payload)?;
-        let picture = Picture::new(device, &ledger, &stages, &plan, &masks, &cache);
-        let cache_before = ledger.buffer(
-            device,
-            Category::Readback,
-            &wgpu::BufferDescriptor {
-                label: Some("progressive-iso.cache_before"),
-                size: lru_cache_gpu::Counters::BYTES.1,
-                usage: wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            },
-        );
+        let samples =
+            SampleBuffers::new(device, &ledger, &stages.samples, &plan.samples, &payload)?;
+        let kept = samples.kept();
+        let loader = Loader::new(device, &ledger, plan.load, &payload, &ranges, kept)?;
+        let picture = Picture::new(device, &ledger, &stages, &plan, &masks, &samples)?;
         let (upload, readback) = (
             UploadRing::new(&ledger, "progressive-iso.upload", PARAMS_CHUNK),
             ReadbackRing::new(
@@ -164,13 +157,11 @@ impl ProgressiveIsoRenderer {
             timer,
             #[cfg(feature = "wgpu-profiler")]
             profile,
-            cache_before,
             payload,
             ranges,
             masks,
             loader: Some(loader),
-            cache,
-            decode,
+            samples,
             picture,
             frame: None,
             frame_count: 0,
@@ -308,15 +299,10 @@ impl ProgressiveIsoRenderer {
             state.rounds += 1;
             let _span =
                 tracing::debug_span!("progressive_iso.round", round = state.rounds).entered();
-            let (stages, cache, decode) = (&self.stages, &self.cache, &self.decode);
+            let (stages, samples) = (&self.stages, &self.samples);
             let Picture { rays, rounds, .. } = &self.picture;
             rounds.record_round(encoder, &stages.rays, rays, &mut |encoder| {
-                {
-                    let _span = tracing::trace_span!("lru_cache_gpu.service").entered();
-                    stages.service.record(encoder, cache);
-                }
-                let _span = tracing::trace_span!("zfp_gpu.decode").entered();
-                stages.decode.record_indirect(encoder, decode, cache.decode_args(), 0);
+                samples.record_service(encoder, &stages.samples);
             });
         }
         self.frame = Some(state);
@@ -331,19 +317,16 @@ impl ProgressiveIsoRenderer {
         let _span = tracing::debug_span!("progressive_iso.start").entered();
         let (stages, frame) = (&self.stages, &state.frame);
         let isovalue = frame.isovalues[0];
-        let (counters, bytes) = lru_cache_gpu::Counters::BYTES;
-        if std::mem::take(&mut self.clear_cache) {
-            stages.service.record_clear(encoder, &self.cache);
-        }
-        encoder.copy_buffer_to_buffer(self.cache.state(), counters, &self.cache_before, 0, bytes);
-        stages.service.record_begin_frame(encoder, &self.cache);
-        if self.active_isovalue != Some(isovalue) {
+        let other_isovalue = self.active_isovalue != Some(isovalue);
+        let clear = std::mem::take(&mut self.clear_cache);
+        self.samples.record_begin_frame(encoder, &stages.samples, clear, other_isovalue);
+        if other_isovalue {
             let (ranges, masks) = (&self.ranges, &self.masks);
             stages.activate.record(device, encoder, &mut self.upload, ranges, masks, isovalue);
             self.active_isovalue = Some(isovalue);
         }
         let grid = self.plan.macrocell.grid();
-        let lru = self.plan.cache.params();
+        let lru = self.plan.samples.params();
         let params = state.view.params(grid, lru, isovalue, frame.options.look_ahead);
         let shading = ShadingParams::new(&frame.options.shading, self.volume.world_from_index);
         let Picture { rays, rounds, .. } = &self.picture;
@@ -363,14 +346,11 @@ impl ProgressiveIsoRenderer {
         dispatches: u32,
     ) {
         let (ray_offset, ray_bytes) = wavefront::Counters::BYTES;
-        let (cache_offset, cache_bytes) = lru_cache_gpu::Counters::BYTES;
-        let mut parts = vec![
-            (self.picture.rays.rays(), ray_offset, ray_bytes),
-            (self.cache.state(), cache_offset, cache_bytes),
-            (&*self.cache_before, 0, cache_bytes),
-        ];
-        parts.push(self.timer.part());
-        parts.extend(self.picture.rounds.statistics());
+        let mut parts = vec![(self.picture.rays.rays(), ray_offset, ray_bytes), self.timer.part()];
+        if let Some(counters) = self.samples.counters() {
+            parts.extend(counters);
+            parts.extend(self.picture.rounds.statistics());
+        }
         let record_bytes = parts.iter().map(|part| part.2 as usize).sum();
         let tag = self.submitted.last().map_or(1, |s| s.tag + 1);
         #[cfg(feature = "wgpu-profiler")]
@@ -549,16 +529,16 @@ impl ProgressiveIsoRenderer {
     /// If the new size does not fit the limits or the budget; nothing changes then.
     pub fn resize(&mut self, device: &wgpu::Device, size: [u32; 2]) -> Result<(), Error> {
         let options = RendererOptions { size, ..self.options };
-        let plan = ScenePlan::new(&self.volume, &options, &self.limits)?;
+        let plan = self.replan(&options)?;
         // The old memory goes before the new one comes, or both together would exceed the budget.
         let smallest = self.plan.shrunk(&self.limits)?;
-        self.rebuild_picture(device, &smallest);
-        if plan.cache != self.plan.cache {
-            self.rebuild_cache(device, &smallest, &options)?;
-            self.rebuild_cache(device, &plan, &options)?;
+        self.rebuild_picture(device, &smallest)?;
+        if plan.samples != self.plan.samples {
+            self.rebuild_samples(device, &smallest, &options)?;
+            self.rebuild_samples(device, &plan, &options)?;
         }
         self.options = options;
-        self.rebuild_picture(device, &plan);
+        self.rebuild_picture(device, &plan)?;
         self.plan = plan;
         if let Some(state) = self.frame.take() {
             self.set_frame(&state.frame)?;
@@ -566,20 +546,37 @@ impl ProgressiveIsoRenderer {
         Ok(())
     }
 
-    fn rebuild_picture(&mut self, device: &wgpu::Device, plan: &ScenePlan) {
-        let (ledger, stages) = (&self.ledger, &self.stages);
-        self.picture = Picture::new(device, ledger, stages, plan, &self.masks, &self.cache);
+    /// A plan for other options with the same volume. What is resident stays so while the budget
+    /// allows it; what is cached stays cached, because loading is over.
+    fn replan(&self, options: &RendererOptions) -> Result<ScenePlan, Error> {
+        let plan = |residency| {
+            let options = RendererOptions { residency, ..*options };
+            ScenePlan::new(&self.volume, &options, &self.limits)
+        };
+        match (self.plan.residency(), options.residency) {
+            (Residency::Full, Residency::Auto) => {
+                plan(Residency::Full).or_else(|_| plan(Residency::Cached))
+            }
+            (residency, _) => plan(residency),
+        }
     }
 
-    fn rebuild_cache(
+    fn rebuild_picture(&mut self, device: &wgpu::Device, plan: &ScenePlan) -> Result<(), Error> {
+        let (ledger, stages) = (&self.ledger, &self.stages);
+        self.picture = Picture::new(device, ledger, stages, plan, &self.masks, &self.samples)?;
+        Ok(())
+    }
+
+    fn rebuild_samples(
         &mut self,
         device: &wgpu::Device,
         plan: &ScenePlan,
         options: &RendererOptions,
     ) -> Result<(), Error> {
         let stages = Stages::new(device, plan, options)?;
-        let (cache, decode) = cache(device, &self.ledger, &stages, plan, &self.payload)?;
-        (self.stages, self.cache, self.decode) = (stages, cache, decode);
+        let (ledger, payload) = (&self.ledger, &self.payload);
+        let samples = SampleBuffers::new(device, ledger, &stages.samples, &plan.samples, payload)?;
+        (self.stages, self.samples) = (stages, samples);
         Ok(())
     }
 

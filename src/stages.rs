@@ -1,22 +1,20 @@
 //! A scene's pipelines, and the memory that they work on.
 
 use gpu_primitives::memory::Ledger;
-use lru_cache_gpu::{CacheBuffers, Service};
 use macrocell::{Activate, Masks};
 use wavefront::{
     Draw, DrawBuffers, OutputTextures, RayBuffers, Rays, Rounds, RunAhead, Scene, Strategy,
 };
-use zfp_gpu::{Decode, DecodeBuffers, Payload};
 
 use crate::plan::StrategyPlan;
+use crate::samples::{SampleBuffers, SampleStages};
 use crate::{Error, RendererOptions, ScenePlan, wgpu};
 
 /// Pipelines; nothing here depends on a picture's size.
 #[derive(Debug)]
 pub(crate) struct Stages {
     pub(crate) activate: Activate,
-    pub(crate) service: Service,
-    pub(crate) decode: Decode,
+    pub(crate) samples: SampleStages,
     pub(crate) rays: Rays,
     pub(crate) strategy: Box<dyn Strategy>,
     pub(crate) draw: Option<Draw>,
@@ -31,37 +29,13 @@ pub(crate) struct Picture {
     pub(crate) draw: Option<DrawBuffers>,
 }
 
-/// The block cache and what decodes into it.
-pub(crate) fn cache(
-    device: &wgpu::Device,
-    ledger: &Ledger,
-    stages: &Stages,
-    plan: &ScenePlan,
-    payload: &Payload,
-) -> Result<(CacheBuffers, DecodeBuffers), Error> {
-    let cache =
-        CacheBuffers::new(device, ledger, &stages.service, &plan.cache, Decode::JOBS_PER_GROUP);
-    let pages: Vec<&wgpu::Buffer> = cache.slots().iter().map(|page| &**page).collect();
-    let decode = DecodeBuffers::new(
-        device,
-        ledger,
-        &stages.decode,
-        payload,
-        cache.jobs(),
-        cache.job_count(),
-        &pages,
-        plan.cache.params().slots_per_page,
-    )?;
-    Ok((cache, decode))
-}
-
 fn strategy(device: &wgpu::Device, plan: &ScenePlan) -> Box<dyn Strategy> {
-    let pages = plan.cache.page_count();
+    let samples = plan.samples.layout();
     match plan.strategy {
-        StrategyPlan::RunAhead => Box::new(RunAhead::new(device, pages)),
+        StrategyPlan::RunAhead => Box::new(RunAhead::new(device, samples)),
         #[cfg(feature = "block-sorted")]
         StrategyPlan::BlockSorted(_, plan) => {
-            Box::new(wavefront::BlockSorted::new(device, pages, plan))
+            Box::new(wavefront::BlockSorted::new(device, samples.pages, plan))
         }
     }
 }
@@ -73,12 +47,10 @@ impl Stages {
         options: &RendererOptions,
     ) -> Result<Self, Error> {
         let _span = tracing::info_span!("progressive_iso.pipelines").entered();
-        let pages = plan.cache.page_count();
         Ok(Self {
             activate: Activate::new(device, plan.macrocell.grid().has_third_level()),
-            service: Service::new(device),
-            decode: Decode::new(device, pages)?,
-            rays: Rays::new(device, plan.wavefront.outputs(), pages),
+            samples: SampleStages::new(device, &plan.samples)?,
+            rays: Rays::new(device, plan.wavefront.outputs(), plan.samples.layout()),
             strategy: strategy(device, plan),
             draw: options.draw_target.map(|target| Draw::new(device, &target)),
         })
@@ -92,15 +64,16 @@ impl Picture {
         stages: &Stages,
         plan: &ScenePlan,
         masks: &Masks,
-        cache: &CacheBuffers,
-    ) -> Self {
+        samples: &SampleBuffers,
+    ) -> Result<Self, Error> {
         let wavefront = &plan.wavefront;
         let textures = OutputTextures::new(device, ledger, wavefront.outputs(), wavefront.size());
-        let rays = RayBuffers::new(device, ledger, &stages.rays, wavefront, cache, &textures);
-        let scene = Scene { rays: &rays, masks: masks.buffer(), cache };
-        let rounds = stages.strategy.bind(device, ledger, scene);
+        let samples = samples.samples();
+        let rays = RayBuffers::new(device, ledger, &stages.rays, wavefront, samples, &textures);
+        let scene = Scene { rays: &rays, masks: masks.buffer(), samples };
+        let rounds = stages.strategy.bind(device, ledger, scene)?;
         let draw =
             stages.draw.as_ref().and_then(|d| DrawBuffers::new(device, ledger, d, &textures));
-        Self { textures, rays, rounds, draw }
+        Ok(Self { textures, rays, rounds, draw })
     }
 }

@@ -16,6 +16,14 @@ pub enum Error {
         /// Bytes given.
         available: u64,
     },
+    /// A volume that is resident as a whole must fit the pages that a kernel binds.
+    #[error("{blocks} blocks cannot all be resident, the device's limits allow {most}")]
+    TooManyBlocks {
+        /// Blocks of the volume.
+        blocks: u64,
+        /// Most blocks under the device's limits.
+        most: u64,
+    },
     /// The directory must fit one binding.
     #[error(
         "the directory of {blocks} blocks needs a binding of {needed} bytes, the device binds at most {available}"

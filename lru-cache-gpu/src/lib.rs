@@ -4,6 +4,7 @@ mod buffers;
 pub mod cpu;
 mod error;
 mod plan;
+mod resident;
 mod service;
 pub mod wgsl;
 
@@ -11,4 +12,5 @@ pub use buffers::CacheBuffers;
 pub use error::Error;
 pub use gpu_primitives::wgpu;
 pub use plan::{CachePlan, LruParams, MAX_PAGES, SLOT_BYTES};
+pub use resident::{ResidentBuffers, ResidentPlan};
 pub use service::{Counters, Service};

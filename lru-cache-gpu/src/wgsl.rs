@@ -26,6 +26,10 @@ pub const SLOTS: Module =
 pub const MODULES: [Module; 5] = [PARAMS, STATE, REQUEST, LOOKUP, SLOTS];
 
 /// Constants that fit [`SLOTS`] to a number of slot pages.
-pub fn page_constants(pages: u32) -> [(&'static str, Constant); 2] {
-    [("LRU_PAGES_2", Constant::Bool(pages >= 2)), ("LRU_PAGES_3", Constant::Bool(pages >= 3))]
+pub fn page_constants(pages: u32) -> [(&'static str, Constant); 3] {
+    [
+        ("LRU_PAGES_2", Constant::Bool(pages >= 2)),
+        ("LRU_PAGES_3", Constant::Bool(pages >= 3)),
+        ("LRU_PAGES_4", Constant::Bool(pages >= 4)),
+    ]
 }

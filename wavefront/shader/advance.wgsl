@@ -14,23 +14,23 @@ fn macrocell_mask(index: u32) -> vec2<u32> {
 }
 
 // The ray's state before the first pair is composited: the block after its last pair, or done.
-fn advance(ray: DdaRay, first_block: vec3<i32>, first_pair: u32, count: u32) -> u32 {
+fn advance(grid: MacrocellGrid, ray: DdaRay, first_block: vec3<i32>, first_pair: u32, count: u32) -> u32 {
     var place = macrocell_advance(
-        frame.grid, ray, macrocell_enter(frame.grid, ray, first_block));
+        grid, ray, macrocell_enter(grid, ray, first_block));
     for (var k = 0u; k < count; k++) {
-        if (!macrocell_inside(frame.grid, place.block)) {
+        if (!macrocell_inside(grid, place.block)) {
             pairs[PAIRS_HEADER + first_pair + k] = PAIR_NONE;
             continue;
         }
-        let block = macrocell_linear(place.block, frame.grid.blocks);
+        let block = macrocell_linear(place.block, grid.blocks);
         pairs[PAIRS_HEADER + first_pair + k] = PAIR_WAITS | block;
         place = macrocell_advance(
-            frame.grid, ray, macrocell_leave(frame.grid, ray, place));
+            grid, ray, macrocell_leave(grid, ray, place));
     }
-    if (!macrocell_inside(frame.grid, place.block)) {
+    if (!macrocell_inside(grid, place.block)) {
         return RAY_DONE;
     }
-    return RAY_ACTIVE | macrocell_linear(place.block, frame.grid.blocks);
+    return RAY_ACTIVE | macrocell_linear(place.block, grid.blocks);
 }
 
 @compute @workgroup_size(64)
@@ -47,9 +47,9 @@ fn main(
     let ray = frame_ray(frame, frame_pixel(frame, id)).ray;
     let block = frame_block_position(frame, rays[RAYS_HEADER + id] & RAY_BLOCK);
 #ifdef EMPTY_SPACE_STEP
-    rays[RAYS_HEADER + id] = advance(ray, block, 0u, 0u);
+    rays[RAYS_HEADER + id] = advance(frame_grid(frame, id), ray, block, 0u, 0u);
 #else
     let count = pairs[PAIRS_SPECULATION];
-    rays[RAYS_HEADER + id] = advance(ray, block, index * count, count);
+    rays[RAYS_HEADER + id] = advance(frame_grid(frame, id), ray, block, index * count, count);
 #endif
 }

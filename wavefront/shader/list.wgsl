@@ -51,7 +51,7 @@ fn main(
 ) {
     let group = indirect_linear_group(group_id, groups);
     // Group 0, which has nothing before it, sums up everything.
-    let end = select(group, list_groups(), group == 0u);
+    let end = select(group, list_groups() + frame_zero(rays[RAYS_HITS]), group == 0u);
     var part = 0u;
     for (var i = lane; i < end; i += SCAN_LANES) {
         part += sums[i];
@@ -63,7 +63,8 @@ fn main(
     let word = group * SCAN_LANES + lane;
     var bits = list_word(word);
     var at = select(summed, 0u, group == 0u) + scan_group(lane, countOneBits(bits)).before;
-    while (bits != 0u && at < frame.list_capacity) {
+    let capacity = frame.list_capacity + frame_zero(summed);
+    while (bits != 0u && at < capacity) {
         rays[frame_list_word(frame, at)] = word * 32u + countTrailingZeros(bits);
         bits &= bits - 1u;
         at++;

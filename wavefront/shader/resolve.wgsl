@@ -2,21 +2,31 @@
 // strategies share this kernel, so that their pictures are equal bit for bit.
 #import frame
 #import indirect
+#ifdef RESIDENT
+#else
 #import lru_lookup
-#import block_slots
+#endif
+#import block_samples
 #import block_walk
 #import outputs
 
 @group(0) @binding(0) var<uniform> frame: FrameParams;
 @group(0) @binding(1) var<uniform> shading: ShadingParams;
 @group(0) @binding(2) var<storage, read_write> rays: array<atomic<u32>>;
+#ifdef RESIDENT
+@group(0) @binding(3) var<storage, read_write> cells: array<atomic<u32>>;
+#else
 @group(0) @binding(3) var<storage, read> lru_directory: array<u32>;
+#endif
 @group(0) @binding(4) var<storage, read> lru_slots_0: array<f32>;
 #ifdef LRU_PAGES_2
 @group(0) @binding(5) var<storage, read> lru_slots_1: array<f32>;
 #endif
 #ifdef LRU_PAGES_3
 @group(0) @binding(6) var<storage, read> lru_slots_2: array<f32>;
+#endif
+#ifdef LRU_PAGES_4
+@group(0) @binding(7) var<storage, read> lru_slots_3: array<f32>;
 #endif
 @group(0) @binding(COLOR_BINDING) var color_out: texture_storage_2d<rgba8unorm, write>;
 #ifdef OUTPUT_DEPTH
@@ -35,6 +45,8 @@ fn lru_slots_per_page() -> u32 {
     return frame.lru.slots_per_page;
 }
 
+#ifdef RESIDENT
+#else
 fn block_use(slot: u32) {}
 
 fn block_cell_is_empty(bit: u32) -> bool {
@@ -42,6 +54,7 @@ fn block_cell_is_empty(bit: u32) -> bool {
 }
 
 fn block_set_empty(bit: u32) {}
+#endif
 
 // Finds the hit again: the first crossing in the block, whose samples are still resident.
 fn hit_in_block(ray: DdaRay, block: vec3<i32>) -> BlockWalk {

@@ -20,13 +20,13 @@
 var<workgroup> entered_bits: array<atomic<u32>, 2>;
 
 // The ray's first state: waiting in the block where it enters the volume, or done.
-fn first_state(ray: DdaRay) -> u32 {
-    let volume = DdaBox(vec3<i32>(0), frame.grid.last_cell);
-    if (any(frame.grid.last_cell < vec3<i32>(0)) || !dda_meets(ray, volume)) {
+fn first_state(grid: MacrocellGrid, ray: DdaRay) -> u32 {
+    let volume = DdaBox(vec3<i32>(0), grid.last_cell);
+    if (any(grid.last_cell < vec3<i32>(0)) || !dda_meets(ray, volume)) {
         return RAY_DONE;
     }
     let cell = dda_cell_after(ray, dda_entry(ray, volume), volume);
-    return RAY_ACTIVE | macrocell_linear(cell >> vec3<u32>(2u), frame.grid.blocks);
+    return RAY_ACTIVE | macrocell_linear(cell >> vec3<u32>(2u), grid.blocks);
 }
 
 @compute @workgroup_size(64)
@@ -42,7 +42,8 @@ fn main(
     let id = indirect_linear_group(group, groups) * 64u + lane;
     let pixel = frame_pixel(frame, id);
     if (id < frame.ray_numbers && pixel.x < frame.width && pixel.y < frame.height) {
-        let state = first_state(frame_ray(frame, pixel).ray);
+        let grid = frame_grid(frame, atomicLoad(&rays[RAYS_HITS]));
+        let state = first_state(grid, frame_ray(frame, pixel).ray);
         let entered = state != RAY_DONE;
         atomicStore(&rays[RAYS_HEADER + id], state);
         outputs_write_empty(pixel, entered);

@@ -4,7 +4,7 @@
 #import indirect
 #import macrocell_skip
 #import lru_request
-#import block_slots
+#import block_samples
 #import block_walk
 
 @group(0) @binding(0) var<uniform> frame: FrameParams;
@@ -18,6 +18,9 @@
 #endif
 #ifdef LRU_PAGES_3
 @group(0) @binding(7) var<storage, read> lru_slots_2: array<f32>;
+#endif
+#ifdef LRU_PAGES_4
+@group(0) @binding(8) var<storage, read> lru_slots_3: array<f32>;
 #endif
 
 fn lru_params() -> LruParams {
@@ -63,41 +66,41 @@ fn request(need: u32, leads: bool) {
 
 // Requests what the ray needs from its place on: in the block there, and in the next active blocks
 // on its way, should it hold no hit.
-fn request_ahead(ray: DdaRay, start: MacrocellPlace, leads: bool) {
+fn request_ahead(grid: MacrocellGrid, ray: DdaRay, start: MacrocellPlace, look_ahead: u32, leads: bool) {
     var place = start;
-    for (var ahead = 0u; ahead < frame.look_ahead; ahead++) {
+    for (var ahead = 0u; ahead < look_ahead; ahead++) {
         if (ahead > 0u) {
-            place = macrocell_advance(frame.grid, ray, macrocell_leave(frame.grid, ray, place));
-            if (!macrocell_inside(frame.grid, place.block)) {
+            place = macrocell_advance(grid, ray, macrocell_leave(grid, ray, place));
+            if (!macrocell_inside(grid, place.block)) {
                 return;
             }
         }
         block_open(place.block);
-        let box = macrocell_box(frame.grid, place.block);
+        let box = macrocell_box(grid, place.block);
         let need = block_need(ray, dda_cell_after(ray, place.event, box), box);
         request(need, leads && ahead == 0u);
     }
 }
 
 // The ray's new state.
-fn walk(ray: DdaRay, first_block: vec3<i32>, leads: bool) -> u32 {
+fn walk(grid: MacrocellGrid, ray: DdaRay, first_block: vec3<i32>, look_ahead: u32, leads: bool) -> u32 {
     var place = macrocell_advance(
-        frame.grid, ray, macrocell_enter(frame.grid, ray, first_block));
-    while (macrocell_inside(frame.grid, place.block)) {
-        let state = macrocell_linear(place.block, frame.grid.blocks);
+        grid, ray, macrocell_enter(grid, ray, first_block));
+    while (macrocell_inside(grid, place.block)) {
+        let state = macrocell_linear(place.block, grid.blocks);
         block_open(place.block);
-        let box = macrocell_box(frame.grid, place.block);
+        let box = macrocell_box(grid, place.block);
         let start = CellPlace(place.event, dda_cell_after(ray, place.event, box));
         let result = block_walk(ray, start, box, frame.isovalue);
         if (result.hit) {
             return RAY_HIT | state;
         }
         if (result.missing) {
-            request_ahead(ray, place, leads);
+            request_ahead(grid, ray, place, look_ahead, leads);
             return RAY_ACTIVE | state;
         }
         place = macrocell_advance(
-            frame.grid, ray, macrocell_step(ray, place.block, result.place.event));
+            grid, ray, macrocell_step(ray, place.block, result.place.event));
     }
     return RAY_DONE;
 }
@@ -115,5 +118,6 @@ fn main(
     let id = rays[frame_list_word(frame, index)];
     let ray = frame_ray(frame, frame_pixel(frame, id)).ray;
     let block = frame_block_position(frame, rays[RAYS_HEADER + id] & RAY_BLOCK);
-    rays[RAYS_HEADER + id] = walk(ray, block, index == 0u);
+    let look_ahead = frame.look_ahead + frame_zero(id);
+    rays[RAYS_HEADER + id] = walk(frame_grid(frame, id), ray, block, look_ahead, index == 0u);
 }

@@ -17,11 +17,14 @@ use gpu_primitives::scan::{Scan, ScanBuffers};
 use gpu_primitives::wgpu;
 use gpu_primitives::wgsl::{Constant, Module};
 
+use lru_cache_gpu::CacheBuffers;
+
 use crate::Error;
 use crate::rays::{
     FRAME_PARAMS, MASKS, RAYS, RAYS_PER_GROUP, READ, RayBuffers, Rays, SLOTS, WRITE, begin,
     resources, source,
 };
+use crate::samples::{SampleLayout, Samples};
 use crate::strategy::{MakeResident, Rounds, Scene, Strategy};
 
 /// Layout of the pairs.
@@ -157,7 +160,7 @@ impl BlockSorted {
         let params = Binding::Uniform { bytes: SPECULATE_BYTES };
         let empty_space = [("EMPTY_SPACE_STEP", Constant::Bool(true))];
         let text = |label, module, bindings, constants| {
-            source(label, module, bindings, slot_pages, constants, None)
+            source(label, module, bindings, SampleLayout::cached(slot_pages), constants, None)
         };
         [
             text("wavefront.speculate", SPECULATE, vec![params, RAYS, pairs], &[]),
@@ -198,16 +201,30 @@ struct BlockSortedRounds {
 }
 
 impl Strategy for BlockSorted {
-    fn bind(&self, device: &wgpu::Device, ledger: &Ledger, scene: Scene<'_>) -> Box<dyn Rounds> {
-        Box::new(BlockSortedRounds::new(device, ledger, self, scene))
+    fn bind(
+        &self,
+        device: &wgpu::Device,
+        ledger: &Ledger,
+        scene: Scene<'_>,
+    ) -> Result<Box<dyn Rounds>, Error> {
+        let Samples::Cached(cache) = scene.samples else {
+            return Err(Error::NeedsCache);
+        };
+        Ok(Box::new(BlockSortedRounds::new(device, ledger, self, scene, cache)))
     }
 }
 
 impl BlockSortedRounds {
-    fn new(device: &wgpu::Device, ledger: &Ledger, stage: &BlockSorted, scene: Scene<'_>) -> Self {
+    fn new(
+        device: &wgpu::Device,
+        ledger: &Ledger,
+        stage: &BlockSorted,
+        scene: Scene<'_>,
+        cache: &CacheBuffers,
+    ) -> Self {
         use wgpu::BufferUsages as Usage;
         let kernels = Arc::clone(&stage.kernels);
-        let Scene { rays, masks, cache } = scene;
+        let Scene { rays, masks, .. } = scene;
         let slots = cache.plan().slots();
         let buffer = |label, size, usage| {
             let label = Some(label);

@@ -36,6 +36,9 @@ pub enum Error {
         /// Most pixels per axis under the device's limits.
         most_edge: u32,
     },
+    /// The strategy decodes blocks as rays need them.
+    #[error("this strategy works with a cache only, not with a volume that is resident as a whole")]
+    NeedsCache,
     /// The start factor is out of range.
     #[error("the start factor is {found}, expected 1 to 8")]
     StartFactor {

@@ -14,6 +14,7 @@ mod outputs;
 mod plan;
 mod rays;
 mod run_ahead;
+mod samples;
 mod strategy;
 
 #[cfg(feature = "block-sorted")]
@@ -30,4 +31,5 @@ pub use outputs::{
 pub use plan::WavefrontPlan;
 pub use rays::{Counters, RayBuffers, Rays};
 pub use run_ahead::RunAhead;
+pub use samples::{SampleLayout, Samples};
 pub use strategy::{MakeResident, Rounds, Scene, Statistics, Strategy};

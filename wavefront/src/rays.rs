@@ -8,18 +8,16 @@ use gpu_primitives::scan;
 use gpu_primitives::upload::UploadRing;
 use gpu_primitives::wgsl::{Constant, Module, compose_fixed};
 use gpu_primitives::{indirect, wgpu};
-use lru_cache_gpu::CacheBuffers;
 
 use crate::frame::{FrameParams, PARAMS_BYTES};
 use crate::outputs::{OUTPUTS, OutputTextures, Outputs, ShadingParams};
+use crate::samples::{SampleLayout, Samples};
 use crate::plan::{ARGS_BYTES, FILL_ARGS_BYTES, RAYS_HEADER_WORDS, WavefrontPlan};
 
 const FRAME: Module = Module { name: "frame", source: include_str!("../shader/lib/frame.wgsl") };
 const CELL: Module = Module { name: "cell", source: include_str!("../shader/lib/cell.wgsl") };
 const BLOCK_WALK: Module =
     Module { name: "block_walk", source: include_str!("../shader/lib/block_walk.wgsl") };
-const BLOCK_SLOTS: Module =
-    Module { name: "block_slots", source: include_str!("../shader/lib/block_slots.wgsl") };
 const LIST: Module = Module { name: "list", source: include_str!("../shader/list.wgsl") };
 const START: Module = Module { name: "start", source: include_str!("../shader/start.wgsl") };
 const RESOLVE: Module = Module { name: "resolve", source: include_str!("../shader/resolve.wgsl") };
@@ -69,8 +67,8 @@ pub struct Rays {
 }
 
 /// Every module that a kernel of this crate may import.
-pub(crate) fn library() -> Vec<Module> {
-    let mut modules = vec![FRAME, CELL, BLOCK_WALK, BLOCK_SLOTS, OUTPUTS, indirect::MODULE, scan::GROUP_MODULE];
+pub(crate) fn library(samples: SampleLayout) -> Vec<Module> {
+    let mut modules = vec![FRAME, CELL, BLOCK_WALK, samples.module(), OUTPUTS, indirect::MODULE, scan::GROUP_MODULE];
     #[cfg(feature = "block-sorted")]
     modules.push(crate::block_sorted::PAIRS);
     modules.extend(macrocell::wgsl::MODULES);
@@ -78,47 +76,47 @@ pub(crate) fn library() -> Vec<Module> {
     modules
 }
 
-/// A kernel of this crate for a cache of `slot_pages` pages, whose last bindings are those of the
-/// `pictures`, if any.
+/// A kernel of this crate, whose last bindings are those of the `pictures`, if any.
 pub(crate) fn source(
     label: &'static str,
     module: Module,
     mut bindings: Vec<Binding>,
-    slot_pages: u32,
+    samples: SampleLayout,
     constants: &[(&'static str, Constant)],
     pictures: Option<Outputs>,
 ) -> KernelSource {
     let mut constants = constants.to_vec();
-    constants.extend(lru_cache_gpu::wgsl::page_constants(slot_pages));
+    constants.extend(lru_cache_gpu::wgsl::page_constants(samples.pages));
+    constants.push(("RESIDENT", Constant::Bool(samples.resident)));
     if let Some(outputs) = pictures {
         constants.extend(outputs.constants(bindings.len() as u32));
         bindings.extend(outputs.bindings());
     }
-    let wgsl = compose_fixed(module, &library(), &constants);
+    let wgsl = compose_fixed(module, &library(samples), &constants);
     KernelSource { label, wgsl, entry_point: "main", bindings }
 }
 
 impl Rays {
-    /// Makes the pipelines for pictures with `outputs` and a cache of `slot_pages` pages.
-    pub fn new(device: &wgpu::Device, outputs: Outputs, slot_pages: u32) -> Self {
+    /// Makes the pipelines for pictures with `outputs`.
+    pub fn new(device: &wgpu::Device, outputs: Outputs, samples: SampleLayout) -> Self {
         let [start, resolve, list_sum, list_fill] =
-            Self::sources(outputs, slot_pages).map(|s| s.kernel(device));
+            Self::sources(outputs, samples).map(|s| s.kernel(device));
         Self { start, resolve, list_sum, list_fill }
     }
 
     /// Texts and bindings of the kernels.
-    pub fn sources(outputs: Outputs, slot_pages: u32) -> [KernelSource; 4] {
+    pub fn sources(outputs: Outputs, samples: SampleLayout) -> [KernelSource; 4] {
         let shading = Binding::Uniform { bytes: size_of::<ShadingParams>() as u64 };
         let start = vec![FRAME_PARAMS, shading, RAYS];
-        let mut resolve = vec![FRAME_PARAMS, shading, RAYS, READ];
-        resolve.extend(vec![SLOTS; slot_pages as usize]);
+        let mut resolve = vec![FRAME_PARAMS, shading, RAYS];
+        resolve.extend(samples.bindings());
         let list = vec![FRAME_PARAMS, RAYS, WRITE, WRITE];
         let fill = [("LIST_FILL", Constant::Bool(true))];
         [
-            source("wavefront.start", START, start, slot_pages, &[], Some(outputs)),
-            source("wavefront.resolve", RESOLVE, resolve, slot_pages, &[], Some(outputs)),
-            source("wavefront.list.sum", LIST, list.clone(), slot_pages, &[], None),
-            source("wavefront.list.fill", LIST, list, slot_pages, &fill, None),
+            source("wavefront.start", START, start, samples, &[], Some(outputs)),
+            source("wavefront.resolve", RESOLVE, resolve, samples, &[], Some(outputs)),
+            source("wavefront.list.sum", LIST, list.clone(), samples, &[], None),
+            source("wavefront.list.fill", LIST, list, samples, &fill, None),
         ]
     }
 
@@ -178,14 +176,13 @@ pub struct RayBuffers {
 }
 
 impl RayBuffers {
-    /// Allocates the state of one picture. `cache` holds the samples, `textures` have the plan's
-    /// outputs and size.
+    /// Allocates the state of one picture. `textures` have the plan's outputs and size.
     pub fn new(
         device: &wgpu::Device,
         ledger: &Ledger,
         stage: &Rays,
         plan: &WavefrontPlan,
-        cache: &CacheBuffers,
+        samples: Samples<'_>,
         textures: &OutputTextures,
     ) -> Self {
         use wgpu::BufferUsages as Usage;
@@ -210,8 +207,8 @@ impl RayBuffers {
         let views = || textures.views().iter().map(wgpu::BindingResource::TextureView);
         let mut start = resources(&[&frame, &shading, &rays]);
         start.extend(views());
-        let mut resolve = resources(&[&frame, &shading, &rays, cache.directory()]);
-        resolve.extend(cache.slots().iter().map(|page| page.as_entire_binding()));
+        let mut resolve = resources(&[&frame, &shading, &rays]);
+        resolve.extend(samples.resources());
         resolve.extend(views());
         let sum = resources(&[&frame, &rays, &sums, &fill_args]);
         let fill = resources(&[&frame, &rays, &sums, &args]);

@@ -10,9 +10,13 @@ use gpu_primitives::wgsl::Module;
 use crate::rays::{
     FRAME_PARAMS, MASKS, RAYS, RayBuffers, Rays, SLOTS, WRITE, begin, resources, source,
 };
+use crate::Error;
+use crate::samples::{SampleLayout, Samples};
 use crate::strategy::{MakeResident, Rounds, Scene, Strategy};
 
 const WALK: Module = Module { name: "walk", source: include_str!("../shader/walk.wgsl") };
+const WALK_RESIDENT: Module =
+    Module { name: "walk_resident", source: include_str!("../shader/walk_resident.wgsl") };
 
 /// The strategy's kernel. Immutable; used with any number of pictures.
 #[derive(Debug)]
@@ -28,27 +32,40 @@ struct RunAheadRounds {
 }
 
 impl RunAhead {
-    /// Makes the pipeline for a cache of `slot_pages` pages.
-    pub fn new(device: &wgpu::Device, slot_pages: u32) -> Self {
-        Self { walk: Arc::new(Self::source(slot_pages).kernel(device)) }
+    /// Makes the pipeline.
+    pub fn new(device: &wgpu::Device, samples: SampleLayout) -> Self {
+        Self { walk: Arc::new(Self::source(samples).kernel(device)) }
     }
 
     /// Text and bindings of the kernel.
-    pub fn source(slot_pages: u32) -> KernelSource {
-        let mut bindings = vec![FRAME_PARAMS, RAYS, MASKS, WRITE, WRITE];
-        bindings.extend(vec![SLOTS; slot_pages as usize]);
-        source("wavefront.walk", WALK, bindings, slot_pages, &[], None)
+    pub fn source(samples: SampleLayout) -> KernelSource {
+        // The directory and the cache's state, or what is known of the cells.
+        let (module, tables) = if samples.resident { (WALK_RESIDENT, 1) } else { (WALK, 2) };
+        let mut bindings = vec![FRAME_PARAMS, RAYS, MASKS];
+        bindings.extend(vec![WRITE; tables]);
+        bindings.extend(vec![SLOTS; samples.pages as usize]);
+        source("wavefront.walk", module, bindings, samples, &[], None)
     }
 }
 
 impl Strategy for RunAhead {
-    fn bind(&self, device: &wgpu::Device, _ledger: &Ledger, scene: Scene<'_>) -> Box<dyn Rounds> {
-        let Scene { rays, masks, cache } = scene;
-        let (directory, state) = (cache.directory(), cache.state());
-        let mut bindings = resources(&[rays.frame(), rays.rays(), masks, directory, state]);
-        bindings.extend(cache.slots().iter().map(|page| page.as_entire_binding()));
+    fn bind(
+        &self,
+        device: &wgpu::Device,
+        _ledger: &Ledger,
+        scene: Scene<'_>,
+    ) -> Result<Box<dyn Rounds>, Error> {
+        let Scene { rays, masks, samples } = scene;
+        let mut bindings = resources(&[rays.frame(), rays.rays(), masks]);
+        match samples {
+            Samples::Cached(cache) => {
+                bindings.extend(resources(&[cache.directory(), cache.state()]));
+            }
+            Samples::Resident(resident) => bindings.extend(resources(&[resident.cells()])),
+        }
+        bindings.extend(samples.slots().iter().map(|page| page.as_entire_binding()));
         let bind = self.walk.bind(device, "wavefront.walk", &bindings);
-        Box::new(RunAheadRounds { walk: Arc::clone(&self.walk), bind })
+        Ok(Box::new(RunAheadRounds { walk: Arc::clone(&self.walk), bind }))
     }
 }
 

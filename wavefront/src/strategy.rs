@@ -4,9 +4,10 @@ use std::fmt::Debug;
 
 use gpu_primitives::memory::Ledger;
 use gpu_primitives::wgpu;
-use lru_cache_gpu::CacheBuffers;
 
+use crate::Error;
 use crate::rays::{RayBuffers, Rays};
+use crate::samples::Samples;
 
 /// What a strategy works on.
 #[derive(Debug, Clone, Copy)]
@@ -16,13 +17,21 @@ pub struct Scene<'a> {
     /// Active masks, as `macrocell` makes them.
     pub masks: &'a wgpu::Buffer,
     /// The blocks' samples.
-    pub cache: &'a CacheBuffers,
+    pub samples: Samples<'a>,
 }
 
 /// A strategy's pipelines. All strategies make the same picture, bit for bit.
 pub trait Strategy: Debug {
     /// Allocates and binds what one picture needs.
-    fn bind(&self, device: &wgpu::Device, ledger: &Ledger, scene: Scene<'_>) -> Box<dyn Rounds>;
+    ///
+    /// # Errors
+    /// [`Error::NeedsCache`] for a strategy that cannot work on a volume that is resident as a whole.
+    fn bind(
+        &self,
+        device: &wgpu::Device,
+        ledger: &Ledger,
+        scene: Scene<'_>,
+    ) -> Result<Box<dyn Rounds>, Error>;
 }
 
 /// Records whatever makes the requested blocks resident: the cache's service and the decode.

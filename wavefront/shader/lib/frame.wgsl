@@ -38,6 +38,20 @@ fn frame_ray(frame: FrameParams, pixel: vec2<u32>) -> FrameRay {
     return FrameRay(dda_ray(origin, direction * depth_per_voxel), depth_per_voxel);
 }
 
+// Zero, for any number below 2^31 that comes from memory. Mesa's lavapipe compiles a kernel anew whenever its uniforms change if a loop
+// ends at a value made of uniforms alone; with this zero added it is not.
+fn frame_zero(loaded: u32) -> u32 {
+    return loaded >> 31u;
+}
+
+// The grids, for loops over them.
+fn frame_grid(frame: FrameParams, loaded: u32) -> MacrocellGrid {
+    var grid = frame.grid;
+    grid.last_cell += vec3<i32>(i32(frame_zero(loaded)));
+    grid.has_third_level += frame_zero(loaded);
+    return grid;
+}
+
 // Status of a ray in the two upper bits of its state; the others hold its block.
 const RAY_ACTIVE: u32 = 0u;          // waits for its block, or has not started
 const RAY_HIT: u32 = 0x40000000u;    // has a hit in its block, not shaded yet

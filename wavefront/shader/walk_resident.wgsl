@@ -1,0 +1,64 @@
+// One round of the listed rays where all samples are resident: each walks to its hit or to the
+// volume's end.
+#import frame
+#import indirect
+#import macrocell_skip
+#import block_samples
+#import block_walk
+
+@group(0) @binding(0) var<uniform> frame: FrameParams;
+@group(0) @binding(1) var<storage, read_write> rays: array<u32>;
+@group(0) @binding(2) var<storage, read> masks: array<vec2<u32>>;
+@group(0) @binding(3) var<storage, read_write> cells: array<atomic<u32>>;
+@group(0) @binding(4) var<storage, read> lru_slots_0: array<f32>;
+#ifdef LRU_PAGES_2
+@group(0) @binding(5) var<storage, read> lru_slots_1: array<f32>;
+#endif
+#ifdef LRU_PAGES_3
+@group(0) @binding(6) var<storage, read> lru_slots_2: array<f32>;
+#endif
+#ifdef LRU_PAGES_4
+@group(0) @binding(7) var<storage, read> lru_slots_3: array<f32>;
+#endif
+
+fn lru_slots_per_page() -> u32 {
+    return frame.lru.slots_per_page;
+}
+
+fn macrocell_mask(index: u32) -> vec2<u32> {
+    return masks[index];
+}
+
+// The ray's new state.
+fn walk(grid: MacrocellGrid, ray: DdaRay, first_block: vec3<i32>) -> u32 {
+    var place = macrocell_advance(
+        grid, ray, macrocell_enter(grid, ray, first_block));
+    while (macrocell_inside(grid, place.block)) {
+        block_open(place.block);
+        let box = macrocell_box(grid, place.block);
+        let start = CellPlace(place.event, dda_cell_after(ray, place.event, box));
+        let result = block_walk(ray, start, box, frame.isovalue);
+        if (result.hit) {
+            return RAY_HIT | macrocell_linear(place.block, frame.grid.blocks);
+        }
+        place = macrocell_advance(
+            grid, ray, macrocell_step(ray, place.block, result.place.event));
+    }
+    return RAY_DONE;
+}
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let index = indirect_linear_group(group, groups) * 64u + lane;
+    if (index >= rays[RAYS_LISTED]) {
+        return;
+    }
+    let id = rays[frame_list_word(frame, index)];
+    let ray = frame_ray(frame, frame_pixel(frame, id)).ray;
+    let block = frame_block_position(frame, rays[RAYS_HEADER + id] & RAY_BLOCK);
+    rays[RAYS_HEADER + id] = walk(frame_grid(frame, id), ray, block);
+}
