@@ -4,8 +4,8 @@ use bytemuck::Zeroable;
 use gpu_primitives::memory::{Buffer, Category, Ledger};
 use gpu_primitives::wgpu;
 
-use crate::plan::{LruParams, SLOT_BYTES};
 use crate::Error;
+use crate::plan::{LruParams, SLOT_BYTES};
 
 /// Bytes per block for what walking kernels remember of it.
 const CELL_BYTES: u64 = 8;

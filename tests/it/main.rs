@@ -14,4 +14,5 @@ mod invariance;
 mod left_out;
 mod published;
 mod reference;
+mod residency;
 mod support;

@@ -5,7 +5,7 @@ use std::hash::{BuildHasher as _, RandomState};
 use gpu_testkit::gpu;
 use progressive_iso::{
     Camera, Capture, CompressedVolume, Frame, FrameOptions, Outputs, PixelStatus,
-    ProgressiveIsoRenderer, RendererOptions, Shading, wgpu,
+    ProgressiveIsoRenderer, RendererOptions, Residency, Shading, wgpu,
 };
 use proptest::test_runner::{Config as ProptestConfig, RngSeed};
 use volume_io::ZfpVolume;
@@ -150,7 +150,14 @@ pub(crate) fn frame(camera: Camera, isovalue: f32) -> Frame {
 
 /// All pictures in 256 MiB.
 pub(crate) fn options(size: [u32; 2]) -> RendererOptions {
-    RendererOptions { size, outputs: ALL_OUTPUTS, capture: true, ..RendererOptions::default() }
+    RendererOptions {
+        size,
+        outputs: ALL_OUTPUTS,
+        capture: true,
+        // Volumes are small here: they would all be resident.
+        residency: Residency::Cached,
+        ..RendererOptions::default()
+    }
 }
 
 pub(crate) fn hit_count(capture: &Capture) -> usize {

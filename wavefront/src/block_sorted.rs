@@ -287,8 +287,7 @@ impl BlockSortedRounds {
         let (frame, states) = (rays.frame(), rays.rays());
         let (directory, state) = (cache.directory(), cache.state());
         let advance = [frame, states, masks, &*pairs];
-        let mut intersect =
-            resources(&[frame, states, &pairs, &visible, &slot_counts, directory]);
+        let mut intersect = resources(&[frame, states, &pairs, &visible, &slot_counts, directory]);
         intersect.extend(cache.slots().iter().map(|page| page.as_entire_binding()));
         Self {
             speculate: bind(&kernels.speculate, &[&speculate_params, states, &pairs]),
@@ -347,12 +346,7 @@ impl BlockSortedRounds {
 
 impl Rounds for BlockSortedRounds {
     /// The empty-space step: every ray goes to its first active block, or is done.
-    fn record_start(
-        &self,
-        encoder: &mut wgpu::CommandEncoder,
-        stage: &Rays,
-        rays: &RayBuffers,
-    ) {
+    fn record_start(&self, encoder: &mut wgpu::CommandEncoder, stage: &Rays, rays: &RayBuffers) {
         {
             let mut pass = begin(encoder, "wavefront.skip");
             self.kernels.skip.dispatch_indirect(&mut pass, &self.skip, rays.args(), 0);

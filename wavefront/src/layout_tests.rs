@@ -9,7 +9,7 @@ use lru_cache_gpu::LruParams;
 use crate::draw::DrawParams;
 use crate::frame::{FrameParams, GridParams};
 use crate::outputs::ShadingParams;
-use crate::{Outputs, Rays};
+use crate::{Outputs, Rays, SampleLayout};
 
 /// Name, offset and size of every member.
 macro_rules! members {
@@ -20,7 +20,8 @@ macro_rules! members {
 }
 
 fn start_source() -> String {
-    let [start, ..] = Rays::sources(Outputs { depth: true, normal: true, status: true }, 1);
+    let [start, ..] =
+        Rays::sources(Outputs { depth: true, normal: true, status: true }, SampleLayout::cached(1));
     start.wgsl.source
 }
 

@@ -3,8 +3,8 @@
 use gpu_primitives::wgpu;
 
 use crate::frame::{FrameParams, PARAMS_BYTES};
-use crate::outputs::ShadingParams;
 use crate::order::RayOrder;
+use crate::outputs::ShadingParams;
 use crate::{Error, Outputs};
 
 /// Words before the rays' states, as in `shader/lib/frame.wgsl`.

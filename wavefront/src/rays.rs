@@ -11,8 +11,8 @@ use gpu_primitives::{indirect, wgpu};
 
 use crate::frame::{FrameParams, PARAMS_BYTES};
 use crate::outputs::{OUTPUTS, OutputTextures, Outputs, ShadingParams};
-use crate::samples::{SampleLayout, Samples};
 use crate::plan::{ARGS_BYTES, FILL_ARGS_BYTES, RAYS_HEADER_WORDS, WavefrontPlan};
+use crate::samples::{SampleLayout, Samples};
 
 const FRAME: Module = Module { name: "frame", source: include_str!("../shader/lib/frame.wgsl") };
 const CELL: Module = Module { name: "cell", source: include_str!("../shader/lib/cell.wgsl") };
@@ -68,7 +68,15 @@ pub struct Rays {
 
 /// Every module that a kernel of this crate may import.
 pub(crate) fn library(samples: SampleLayout) -> Vec<Module> {
-    let mut modules = vec![FRAME, CELL, BLOCK_WALK, samples.module(), OUTPUTS, indirect::MODULE, scan::GROUP_MODULE];
+    let mut modules = vec![
+        FRAME,
+        CELL,
+        BLOCK_WALK,
+        samples.module(),
+        OUTPUTS,
+        indirect::MODULE,
+        scan::GROUP_MODULE,
+    ];
     #[cfg(feature = "block-sorted")]
     modules.push(crate::block_sorted::PAIRS);
     modules.extend(macrocell::wgsl::MODULES);

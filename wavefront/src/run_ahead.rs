@@ -7,10 +7,10 @@ use gpu_primitives::memory::Ledger;
 use gpu_primitives::wgpu;
 use gpu_primitives::wgsl::Module;
 
+use crate::Error;
 use crate::rays::{
     FRAME_PARAMS, MASKS, RAYS, RayBuffers, Rays, SLOTS, WRITE, begin, resources, source,
 };
-use crate::Error;
 use crate::samples::{SampleLayout, Samples};
 use crate::strategy::{MakeResident, Rounds, Scene, Strategy};
 

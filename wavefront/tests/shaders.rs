@@ -2,7 +2,7 @@
 
 use gpu_primitives::kernel::{Binding, KernelSource};
 use gpu_testkit::layout::{self, BindingKind};
-use wavefront::{Outputs, Rays, RunAhead};
+use wavefront::{Outputs, Rays, RunAhead, SampleLayout};
 
 fn kind(binding: &Binding) -> BindingKind {
     match *binding {
@@ -27,12 +27,20 @@ fn kernels_validate_with_every_set_of_outputs_and_pages() {
     for bits in 0..8 {
         let outputs =
             Outputs { depth: bits & 1 != 0, normal: bits & 2 != 0, status: bits & 4 != 0 };
-        for pages in 1..=3 {
-            Rays::sources(outputs, pages).iter().for_each(check);
-            check(&RunAhead::source(pages));
-            #[cfg(feature = "block-sorted")]
-            wavefront::BlockSorted::sources(pages).iter().for_each(check);
+        for pages in 1..=4 {
+            for samples in [SampleLayout::cached(pages), SampleLayout::resident(pages)] {
+                Rays::sources(outputs, samples).iter().for_each(check);
+                check(&RunAhead::source(samples));
+            }
         }
+    }
+}
+
+#[cfg(feature = "block-sorted")]
+#[test]
+fn block_sorted_kernels_validate() {
+    for pages in 1..=3 {
+        wavefront::BlockSorted::sources(pages).iter().for_each(check);
     }
 }
 

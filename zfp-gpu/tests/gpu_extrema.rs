@@ -6,10 +6,10 @@ mod common;
 
 use common::gpu::{Gpu, SENTINEL};
 use common::{Kind, Random, assert_same_bits, behind_header, encode, field};
+use gpu_primitives::memory::{Buffer, Category};
 use gpu_testkit::gpu::{read_f32s, sentinel_buffer, submit_and_wait};
 use zfp_gpu::cpu::decode::{decode_block, decode_volume};
 use zfp_gpu::cpu::extrema::{block_extrema, region_extrema};
-use gpu_primitives::memory::{Buffer, Category};
 use zfp_gpu::{BlockExtrema, Error, ExtremaBuffers, KeptSamples, Payload, StreamLayout};
 
 type Region = ([u32; 3], [u32; 3]);
@@ -106,7 +106,8 @@ fn two_regions_of_one_encoder_keep_their_parameters() {
     let regions: [Region; 2] = [([0, 0, 0], [2, 2, 1]), ([1, 1, 0], [1, 2, 2])];
     let outputs = regions.map(|_| sentinel_buffer(&gpu.device, 4 * 64, SENTINEL));
     let work = sentinel_buffer(&gpu.device, 4 * 64, SENTINEL);
-    let buffers = ExtremaBuffers::new(&gpu.device, &gpu.ledger, &stage, &payload, &work, None).unwrap();
+    let buffers =
+        ExtremaBuffers::new(&gpu.device, &gpu.ledger, &stage, &payload, &work, None).unwrap();
     let mut encoder = gpu.encoder();
     for ((origin, size), output) in regions.into_iter().zip(&outputs) {
         stage.record(&gpu.device, &mut encoder, &mut gpu.upload, &buffers, origin, size).unwrap();
@@ -130,9 +131,8 @@ fn outputs_that_are_too_small_are_refused() {
     let payload = Payload::new(&gpu.device, &gpu.ledger, &plan);
     let before = gpu.ledger.total();
     let output = |bytes| sentinel_buffer(&gpu.device, bytes, SENTINEL);
-    let bind = |output: &_| {
-        ExtremaBuffers::new(&gpu.device, &gpu.ledger, &stage, &payload, output, None)
-    };
+    let bind =
+        |output: &_| ExtremaBuffers::new(&gpu.device, &gpu.ledger, &stage, &payload, output, None);
     assert!(matches!(bind(&output(60)), Err(Error::BufferTooSmall { expected: 64, .. })));
     let buffers = bind(&output(23 * 64)).unwrap();
     assert_eq!(gpu.ledger.total() - before, ExtremaBuffers::BYTES);
@@ -171,15 +171,9 @@ fn kept_samples_equal_the_decoded_ones() {
         let per_page = blocks.div_ceil(u64::from(pages));
         let slots = slot_pages(&gpu, blocks, per_page);
         let kept = KeptSamples { pages: &slots, slots_per_page: per_page as u32 };
-        let buffers = ExtremaBuffers::new(
-            &gpu.device,
-            &gpu.ledger,
-            &stage,
-            &payload,
-            &output,
-            Some(kept),
-        )
-        .unwrap();
+        let buffers =
+            ExtremaBuffers::new(&gpu.device, &gpu.ledger, &stage, &payload, &output, Some(kept))
+                .unwrap();
         let mut encoder = gpu.encoder();
         // Two layers of regions, each with the next layer on top.
         for (origin, size) in [([0; 3], [bx + 1, by + 1, 5]), ([0, 0, 4], [bx + 1, by + 1, 5])] {

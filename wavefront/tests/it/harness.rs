@@ -14,8 +14,8 @@ use macrocell::cpu::ranges;
 use macrocell::cpu::skip::Masks;
 use proptest::test_runner::{Config as ProptestConfig, RngSeed};
 use wavefront::{
-    Camera, FrameParams, FrameView, OutputTextures, Outputs, RayBuffers, Rays, RunAhead, Scene,
-    Shading, ShadingParams, Strategy, WavefrontPlan, wgpu,
+    Camera, FrameParams, FrameView, OutputTextures, Outputs, RayBuffers, Rays, RunAhead,
+    SampleLayout, Samples, Scene, Shading, ShadingParams, Strategy, WavefrontPlan, wgpu,
 };
 
 /// Width of all pictures: rows of 4-byte pixels are then aligned for copies.
@@ -144,8 +144,8 @@ impl Stage {
         }
         .kernel(&device);
         let service = Service::new(&device);
-        let rays = Rays::new(&device, OUTPUTS, 1);
-        let run_ahead = RunAhead::new(&device, 1);
+        let rays = Rays::new(&device, OUTPUTS, SampleLayout::cached(1));
+        let run_ahead = RunAhead::new(&device, SampleLayout::cached(1));
         Self { device, queue, store, service, rays, run_ahead }
     }
 
@@ -197,9 +197,10 @@ impl Stage {
         let words: Vec<u32> =
             masks.words.iter().flat_map(|&w| [w as u32, (w >> 32) as u32]).collect();
         let masks = self.buffer(&words);
-        let rays = RayBuffers::new(device, &ledger, &self.rays, &wavefront, &cache, &textures);
-        let scene = Scene { rays: &rays, masks: &masks, cache: &cache };
-        let rounds = self.run_ahead.bind(device, &ledger, scene);
+        let samples = Samples::Cached(&cache);
+        let rays = RayBuffers::new(device, &ledger, &self.rays, &wavefront, samples, &textures);
+        let scene = Scene { rays: &rays, masks: &masks, samples };
+        let rounds = self.run_ahead.bind(device, &ledger, scene).unwrap();
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let samples: Vec<u32> =
             shot.field.blocks(padding).iter().map(|value| value.to_bits()).collect();

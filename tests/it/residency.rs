@@ -1,0 +1,143 @@
+//! A volume that is resident as a whole makes the same pictures, in one pass, and needs no cache.
+
+use progressive_iso::{
+    BlockSortedOptions, Capture, Category, Error, ProgressiveIsoRenderer, RendererOptions,
+    Residency, ScenePlan, TraversalStrategy, wgpu,
+};
+
+use crate::invariance::same_picture;
+use crate::support::{Gpu, Scene, hit_count, options};
+
+const SIZE: [u32; 2] = [64, 48];
+
+fn with(residency: Residency) -> RendererOptions {
+    RendererOptions { residency, ..options(SIZE) }
+}
+
+fn plan(scene: &Scene, options: &RendererOptions) -> Result<ScenePlan, Error> {
+    ScenePlan::new(&scene.compressed(), options, &wgpu::Limits::default())
+}
+
+fn bytes_of(renderer: &ProgressiveIsoRenderer, category: Category) -> u64 {
+    let all = renderer.bytes_by_category();
+    all.iter().find(|(c, _)| *c == category).map_or(0, |&(_, bytes)| bytes)
+}
+
+#[test]
+fn both_residencies_make_the_same_picture() {
+    let gpu = Gpu::new();
+    for (name, dims, rate) in [
+        ("gyroid", [37, 26, 31], 9.0),
+        ("turbulence", [70, 65, 33], 4.0),
+        ("rough-solid", [40, 41, 43], 6.0),
+        ("sphere", [2, 3, 2], 16.0),
+        ("plane", [5, 1, 4], 16.0),
+    ] {
+        let scene = Scene::generated(name, dims, rate);
+        for azimuth in [15.0, 200.0] {
+            let frame = scene.frame(scene.orbit(azimuth, 25.0, SIZE));
+            let cached = gpu.render(&scene, with(Residency::Cached), &frame);
+            let mut renderer = gpu.renderer(&scene, with(Residency::Full));
+            let full = gpu.finish(&mut renderer, &frame);
+            same_picture(&full, &cached).unwrap();
+            let report = renderer.poll_report();
+            assert_eq!((report.blocks_decoded, report.blocks_requested), (0, 0), "{name}");
+            // Again, when nothing is left to load: one round.
+            let again = gpu.finish(&mut renderer, &frame);
+            same_picture(&again, &cached).unwrap();
+            assert_eq!((renderer.poll_report().pass, renderer.poll_report().rounds), (1, 1));
+        }
+    }
+}
+
+/// What rays have found out about cells holds for one isovalue only.
+#[test]
+fn other_isovalues_forget_what_is_known_of_cells() {
+    let gpu = Gpu::new();
+    let mut scene = Scene::generated("gyroid", [37, 26, 31], 9.0);
+    let mut renderer = gpu.renderer(&scene, with(Residency::Full));
+    let mut hits = Vec::new();
+    for isovalue in [0.0, 0.4, -0.3, 0.0] {
+        scene.isovalue = isovalue;
+        let frame = scene.frame(scene.orbit(40.0, 10.0, SIZE));
+        let found = gpu.finish(&mut renderer, &frame);
+        let expected: Capture = gpu.render(&scene, with(Residency::Cached), &frame);
+        same_picture(&found, &expected).unwrap();
+        hits.push(hit_count(&found));
+    }
+    assert!(hits[0] == hits[3] && hits[0] != hits[1] && hits[1] > 100, "{hits:?}");
+}
+
+#[test]
+fn the_plan_chooses_by_strategy_and_budget() {
+    let scene = Scene::generated("gyroid", [60, 57, 58], 8.0);
+    let auto = options(SIZE);
+    let auto = RendererOptions { residency: Residency::Auto, ..auto };
+    assert_eq!(plan(&scene, &auto).unwrap().residency(), Residency::Full);
+    let strategy = TraversalStrategy::BlockSorted(BlockSortedOptions::default());
+    let sorted = RendererOptions { strategy, ..auto };
+    assert_eq!(plan(&scene, &sorted).unwrap().residency(), Residency::Cached);
+    let refused = plan(&scene, &RendererOptions { residency: Residency::Full, ..sorted });
+    assert!(matches!(refused, Err(Error::Wavefront(_))), "{refused:?}");
+
+    let forced = |budget_bytes| {
+        plan(&scene, &RendererOptions { budget_bytes, residency: Residency::Full, ..auto })
+    };
+    let Err(Error::BudgetTooSmall { minimum, .. }) = forced(1 << 20) else {
+        panic!("a megabyte does not hold {} blocks", 15 * 15 * 15);
+    };
+    assert_eq!(forced(minimum).unwrap().bytes(), minimum);
+    assert!(forced(minimum - 1).is_err());
+    let chosen =
+        |budget_bytes| plan(&scene, &RendererOptions { budget_bytes, ..auto }).unwrap().residency();
+    assert_eq!(chosen(minimum), Residency::Full);
+    assert_eq!(chosen(minimum - 1), Residency::Cached);
+}
+
+#[test]
+fn full_residency_leaves_the_cache_out() {
+    let gpu = Gpu::new();
+    let scene = Scene::generated("gyroid", [60, 57, 58], 8.0);
+    let blocks = 15 * 15 * 15;
+    let mut renderer = gpu.renderer(&scene, with(Residency::Full));
+    let frame = scene.frame(scene.orbit(15.0, 20.0, SIZE));
+    gpu.finish(&mut renderer, &frame);
+    gpu.finish(&mut renderer, &frame);
+    assert_eq!(bytes_of(&renderer, Category::Slots), 256 * blocks);
+    assert_eq!(bytes_of(&renderer, Category::Directory), 8 * blocks);
+    let included = |name: &str| {
+        renderer.plan().parts().iter().find(|part| part.name == name).unwrap().included
+    };
+    assert!(included("resident volume") && !included("cache"));
+    assert!(renderer.poll_report().peak_bytes <= renderer.plan().bytes());
+    let full = renderer.poll_report().dispatches;
+    let mut cached = gpu.renderer(&scene, with(Residency::Cached));
+    gpu.finish(&mut cached, &frame);
+    gpu.finish(&mut cached, &frame);
+    // Neither service nor decode.
+    assert!(full + 5 <= cached.poll_report().dispatches, "{full}");
+}
+
+#[test]
+fn a_picture_that_no_longer_fits_beside_the_volume_moves_it_into_a_cache() {
+    let gpu = Gpu::new();
+    let scene = Scene::generated("gyroid", [60, 57, 58], 8.0);
+    let auto = RendererOptions { residency: Residency::Auto, ..options(SIZE) };
+    let budget_bytes = plan(&scene, &auto).unwrap().bytes() + 100_000;
+    let mut renderer = gpu.renderer(&scene, RendererOptions { budget_bytes, ..auto });
+    assert_eq!(renderer.plan().residency(), Residency::Full);
+    let frame = scene.frame(scene.orbit(15.0, 20.0, SIZE));
+    let expected = gpu.finish(&mut renderer, &frame);
+    for size in [[96, 72], SIZE] {
+        renderer.resize(&gpu.device, size).unwrap();
+        // What was loaded for a cache stays in one.
+        assert_eq!(renderer.plan().residency(), Residency::Cached, "{size:?}");
+        let frame = scene.frame(scene.orbit(15.0, 20.0, size));
+        let found = gpu.finish(&mut renderer, &frame);
+        let cached = RendererOptions { residency: Residency::Cached, ..options(size) };
+        same_picture(&found, &gpu.render(&scene, cached, &frame)).unwrap();
+        assert!(renderer.poll_report().peak_bytes <= budget_bytes);
+    }
+    let found = gpu.finish(&mut renderer, &frame);
+    same_picture(&found, &expected).unwrap();
+}
