@@ -128,7 +128,7 @@ fn a_picture_that_no_longer_fits_beside_the_volume_moves_it_into_a_cache() {
     assert_eq!(renderer.plan().residency(), Residency::Full);
     let frame = scene.frame(scene.orbit(15.0, 20.0, SIZE));
     let expected = gpu.finish(&mut renderer, &frame);
-    for size in [[96, 72], SIZE] {
+    for size in [[120, 90], SIZE] {
         renderer.resize(&gpu.device, size).unwrap();
         // What was loaded for a cache stays in one.
         assert_eq!(renderer.plan().residency(), Residency::Cached, "{size:?}");
