@@ -20,6 +20,9 @@ pub(crate) const PARAMS_CHUNK: u64 = 1024;
 /// Staging memory of parameters: chunks of at most [`PARAMS_CHUNK`] bytes, two passes in flight.
 const PARAMS_STAGING: u64 = 128 << 10;
 
+/// Most pages of slots: what the kernels of all strategies have bindings for.
+const SLOT_PAGES: u64 = 3;
+
 /// One part of a scene.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
@@ -86,7 +89,8 @@ impl ScenePlan {
             return Err(Error::BudgetTooSmall { minimum, budget: budget_bytes });
         }
         let beside = |slots| strategy.bytes(slots);
-        let cache = CachePlan::fit_beside(blocks, budget_bytes - fixed, limits, beside)?;
+        let cache_bytes = budget_bytes - fixed;
+        let cache = CachePlan::fit_beside(blocks, cache_bytes, limits, SLOT_PAGES, beside)?;
         parts.push(strategy.part(cache.slots()));
         parts.push(cache_part(&cache, blocks));
         Ok(Self { payload, macrocell, load, cache, wavefront, strategy, parts, budget_bytes })

@@ -16,16 +16,12 @@ pub enum Error {
         /// Bytes given.
         available: u64,
     },
-    /// The directory must fit one binding.
-    #[error(
-        "the directory of {blocks} blocks needs a binding of {needed} bytes, the device binds at most {available}"
-    )]
-    DirectoryTooLarge {
+    /// The directory numbers blocks in 32 bits.
+    #[error("a volume of {blocks} blocks has more than the {most} that can be numbered")]
+    TooManyBlocks {
         /// Blocks of the volume.
         blocks: u64,
-        /// Bytes of the directory.
-        needed: u64,
-        /// Largest storage binding of the device in bytes.
-        available: u64,
+        /// Most blocks.
+        most: u64,
     },
 }

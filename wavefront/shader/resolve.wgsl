@@ -33,6 +33,10 @@
 
 var<workgroup> hit_count: atomic<u32>;
 
+fn lru_params() -> LruParams {
+    return frame.lru;
+}
+
 fn lru_slots_per_page() -> u32 {
     return frame.lru.slots_per_page;
 }

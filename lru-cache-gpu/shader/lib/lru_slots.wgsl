@@ -1,5 +1,5 @@
 // Samples of resident blocks. The importing text declares lru_slots_0 and, with the constants
-// LRU_PAGES_2 and LRU_PAGES_3, lru_slots_1 and lru_slots_2, each
+// LRU_PAGES_2, LRU_PAGES_3 and LRU_PAGES_4, lru_slots_1, lru_slots_2 and lru_slots_3, each
 //   var<storage, read> lru_slots_0: array<f32>;
 // and fn lru_slots_per_page() -> u32.
 
@@ -16,6 +16,11 @@ fn lru_sample(slot: u32, offset: u32) -> f32 {
     if (page == 2u) {
         return lru_slots_2[index];
     }
+#ifdef LRU_PAGES_4
+    if (page == 3u) {
+        return lru_slots_3[index];
+    }
+#endif
 #endif
     return lru_slots_1[index];
 #else
