@@ -80,8 +80,9 @@ fn leader_slot() -> u32 {
 fn is_requested(block: u32) -> bool {
     var place = lru_hash(block) & (lru_table_places() - 1u);
     for (var probe = 0u; probe < LRU_PROBES; probe++) {
-        if (atomicLoad(&lru_state[lru_table_word(place)]) == block + 1u) {
-            return true;
+        let found = atomicLoad(&lru_state[lru_table_word(place)]);
+        if (found == 0u || found == block + 1u) {
+            return found != 0u;
         }
         place = lru_next_place(place, probe);
     }

@@ -20,7 +20,7 @@ pub(crate) const LEADER: usize = 16;
 pub(crate) const HEADER: usize = 25;
 
 pub(crate) const LEADER_CAPACITY: usize = 8;
-pub(crate) const PROBES: u32 = 8;
+pub(crate) const PROBES: u32 = 32;
 
 pub(crate) const BLOCK: usize = 0;
 pub(crate) const NEXT: usize = 1;

@@ -31,8 +31,10 @@ const LRU_LEADER_CAPACITY: u32 = 8u;
 // Stamp of a slot that the leader needs, while its round is served.
 const LRU_PINNED: u32 = 0xffffffffu;
 
-// Places of the request table that one block may take.
-const LRU_PROBES: u32 = 8u;
+// Places of the request table that one block may take. At most about half of the table is taken, so
+// a look ends after two places on average, and one request in 2^32 fails. With 8 places, one in 256
+// would, and rays would wait a round longer for no good reason.
+const LRU_PROBES: u32 = 32u;
 
 // Round of the last use; 0 for a slot that was never used.
 fn lru_stamp_word(slot: u32) -> u32 {

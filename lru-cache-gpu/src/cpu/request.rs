@@ -36,7 +36,7 @@ impl Cache {
 
     /// Whether a block is in the request table.
     pub fn is_requested(&self, block: u32) -> bool {
-        self.places(block).into_iter().any(|place| self.state[self.table_word(place)] == block + 1)
+        self.places(block).any(|place| self.state[self.table_word(place)] == block + 1)
     }
 
     /// Says what the leader needs; blocks beyond the first 8 are left out.
@@ -47,14 +47,13 @@ impl Cache {
         }
     }
 
-    /// Places of the request table that a block may take.
-    fn places(&self, block: u32) -> [u32; PROBES as usize] {
-        let first = hash(block) & (self.table_places() - 1);
-        let mut places = [first; PROBES as usize];
-        for probe in 1..PROBES {
-            let before = places[probe as usize - 1];
-            places[probe as usize] = (before + probe) & (self.table_places() - 1);
-        }
-        places
+    /// Places of the request table that a block may take, in order.
+    fn places(&self, block: u32) -> impl Iterator<Item = u32> + use<> {
+        let mask = self.table_places() - 1;
+        (0..PROBES).scan(hash(block) & mask, move |next, probe| {
+            let place = *next;
+            *next = (place + probe + 1) & mask;
+            Some(place)
+        })
     }
 }
