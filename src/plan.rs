@@ -20,9 +20,6 @@ pub(crate) const PASSES_IN_FLIGHT: usize = 2;
 /// Largest upload chunk of a frame's parameters.
 pub(crate) const PARAMS_CHUNK: u64 = 1024;
 
-/// Most pages of slots of a volume that is resident as a whole: a walking kernel has 8 storage buffers.
-const MOST_SLOT_PAGES: u64 = 4;
-
 /// Staging memory of parameters: chunks of at most [`PARAMS_CHUNK`] bytes, two passes in flight.
 const PARAMS_STAGING: u64 = 128 << 10;
 
@@ -187,7 +184,8 @@ impl Scene<'_> {
             return Err(Error::BudgetTooSmall { minimum, budget });
         }
         let beside = |slots| strategy.bytes(slots);
-        let cache = CachePlan::fit_beside(blocks, budget - fixed, self.limits, beside)?;
+        let most_pages = strategy.most_slot_pages();
+        let cache = CachePlan::fit_beside(blocks, budget - fixed, self.limits, most_pages, beside)?;
         parts.push(strategy.part(cache.slots()));
         parts.push(cache_part(&cache, blocks));
         parts.push(left_out("resident volume", "decoded on demand"));
@@ -200,7 +198,7 @@ impl Scene<'_> {
             return Err(Error::Wavefront(wavefront::Error::NeedsCache));
         }
         let blocks = self.macrocell.grid().block_count();
-        let resident = ResidentPlan::new(blocks, self.limits, MOST_SLOT_PAGES)?;
+        let resident = ResidentPlan::new(blocks, self.limits, self.strategy.most_slot_pages())?;
         let (load, mut parts, fixed) = self.fixed(resident.bytes());
         let minimum = fixed + resident.bytes();
         if minimum > budget {
@@ -248,6 +246,15 @@ impl StrategyPlan {
                 let plan = wavefront::BlockSortedPlan::new(rays, options, limits)?;
                 Ok(Self::BlockSorted(options, plan))
             }
+        }
+    }
+
+    /// Pages of slots that the strategy's kernels have bindings for beside their other buffers.
+    fn most_slot_pages(self) -> u64 {
+        match self {
+            Self::RunAhead => 4,
+            #[cfg(feature = "block-sorted")]
+            Self::BlockSorted(..) => 3,
         }
     }
 

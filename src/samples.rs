@@ -151,6 +151,9 @@ impl SampleBuffers {
                 let (offset, bytes) = Counters::BYTES;
                 encoder.copy_buffer_to_buffer(cache.state(), offset, counters_before, 0, bytes);
                 service.record_begin_frame(encoder, cache);
+                if other_isovalue {
+                    service.record_reset_user_words(encoder, cache);
+                }
             }
             (Self::Resident(resident), _) if other_isovalue => {
                 resident.record_forget_cells(encoder);

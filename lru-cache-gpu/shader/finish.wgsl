@@ -1,6 +1,6 @@
 // Closes the service of a round: advances hand and clock, counts, and writes the arguments of the
 // decode dispatch. One invocation.
-#import lru_state
+#import lru_service
 #import indirect
 
 struct FinishParams {
@@ -14,39 +14,52 @@ struct FinishParams {
 @group(0) @binding(0) var<uniform> params: FinishParams;
 @group(0) @binding(1) var<storage, read_write> lru_directory: array<atomic<u32>>;
 @group(0) @binding(2) var<storage, read_write> lru_state: array<atomic<u32>>;
-@group(0) @binding(3) var<storage, read> control: array<u32>;
-@group(0) @binding(4) var<storage, read> victims: array<u32>;
-@group(0) @binding(5) var<storage, read> victim_count: array<u32>;
-@group(0) @binding(6) var<storage, read_write> decode_args: array<u32>;
+@group(0) @binding(3) var<storage, read_write> decode_args: array<u32>;
 
 fn lru_params() -> LruParams {
     return params.lru;
 }
 
-// Once every slot was searched in vain, slots used in earlier rounds of this frame may go too.
-fn advance_hand(requests: u32) {
-    let slots = params.lru.slots;
-    let window = control[3];
-    let found = select(victim_count[0], 0u, window == 0u);
-    if (found >= requests && requests > 0u) {
-        atomicStore(&lru_state[LRU_HAND], (victims[requests - 1u] + 1u) % slots);
+// After a sweep over all slots in vain, one frame less is spared.
+fn count_swept(window: u32) {
+    let swept = min(atomicLoad(&lru_state[LRU_SWEPT]) + window, params.lru.slots);
+    let frames = atomicLoad(&lru_state[LRU_SPARED_FRAMES]);
+    if (swept == params.lru.slots && frames > 0u) {
+        atomicStore(&lru_state[LRU_SPARED_FRAMES], frames - 1u);
+        atomicStore(&lru_state[LRU_SWEPT], 0u);
+    } else {
+        atomicStore(&lru_state[LRU_SWEPT], swept);
+    }
+}
+
+fn advance_hand() {
+    let window = lru_window();
+    if (window == 0u) {
         return;
     }
-    atomicStore(&lru_state[LRU_HAND], (atomicLoad(&lru_state[LRU_HAND]) + window) % slots);
-    let swept = min(atomicLoad(&lru_state[LRU_SWEPT]) + window, slots);
-    atomicStore(&lru_state[LRU_SWEPT], swept);
-    if (swept >= slots) {
-        atomicStore(&lru_state[LRU_SPARE_FRAME], 0u);
+    let hand = (atomicLoad(&lru_state[LRU_HAND]) + window) % params.lru.slots;
+    if (lru_found() < lru_wanted()) {
+        count_swept(window);
+    } else {
+        atomicStore(&lru_state[LRU_SWEPT], 0u);
     }
+    atomicStore(&lru_state[LRU_HAND], hand);
 }
 
 @compute @workgroup_size(1)
 fn main() {
-    let requests = lru_requests();
-    let jobs = atomicLoad(&lru_state[LRU_JOB_COUNT]);
-    advance_hand(requests);
-    atomicAdd(&lru_state[LRU_REQUESTED_TOTAL], requests);
+    let placed = lru_placed();
+    let evicted = lru_evicted();
+    let jobs = atomicLoad(&lru_state[LRU_JOB_COUNT]) + placed;
+    advance_hand();
+    atomicStore(&lru_state[LRU_JOB_COUNT], jobs);
+    atomicAdd(&lru_state[LRU_REQUESTED_TOTAL], atomicLoad(&lru_state[LRU_REQUEST_COUNT]));
     atomicAdd(&lru_state[LRU_DECODED_TOTAL], jobs);
+    atomicAdd(&lru_state[LRU_EVICTED_TOTAL], evicted);
+    // Last, as everything above depends on them.
+    atomicAdd(&lru_state[LRU_NEXT_FREE], placed - evicted);
+    atomicStore(&lru_state[LRU_FOUND], 0u);
+    atomicStore(&lru_state[LRU_TAKEN], 0u);
     atomicStore(&lru_state[LRU_REQUEST_COUNT], 0u);
     atomicStore(&lru_state[LRU_LEADER_COUNT], 0u);
     atomicAdd(&lru_state[LRU_CLOCK], 1u);

@@ -1,6 +1,7 @@
-// Opens the service of a round: gives the leader its blocks before anybody else and says how many
-// slots the search for victims looks at. One invocation.
-#import lru_state
+// Opens the service of a round: gives the leader its blocks before anybody else and sizes the
+// dispatches that follow. One invocation, which therefore changes the directory as it likes.
+#import lru_request
+#import lru_service
 #import indirect
 
 @group(0) @binding(0) var<uniform> params: LruParams;
@@ -16,8 +17,8 @@ fn lru_params() -> LruParams {
     return params;
 }
 
-fn leader_entry(index: u32) -> u32 {
-    return atomicLoad(&lru_directory[atomicLoad(&lru_state[LRU_LEADER + index])]);
+fn leader_block(index: u32) -> u32 {
+    return atomicLoad(&lru_state[LRU_LEADER + index]);
 }
 
 // How reluctantly the leader takes a slot, 3: never.
@@ -55,51 +56,81 @@ fn leader_victim() -> u32 {
     return best;
 }
 
+// Takes the block out of a slot.
+fn evict(slot: u32) {
+    let old_block = atomicExchange(&lru_directory[lru_entry_index(slot) + LRU_BLOCK], 0u) - 1u;
+    let head = lru_head_index(old_block);
+    atomicStore(&lru_directory[head], lru_without_victims(atomicLoad(&lru_directory[head])));
+    atomicAdd(&lru_state[LRU_EVICTED_TOTAL], 1u);
+}
+
+// A slot for a block of the leader; one that was never used, if there is any.
+fn leader_slot() -> u32 {
+    let next_free = atomicLoad(&lru_state[LRU_NEXT_FREE]);
+    if (next_free < params.slots) {
+        atomicStore(&lru_state[LRU_NEXT_FREE], next_free + 1u);
+        return next_free;
+    }
+    let slot = leader_victim();
+    evict(slot);
+    return slot;
+}
+
+// Whether a block is in the request table; it may be even if a look-up finds it.
+fn is_requested(block: u32) -> bool {
+    var place = lru_hash(block) & (lru_table_places() - 1u);
+    for (var probe = 0u; probe < LRU_PROBES; probe++) {
+        let found = atomicLoad(&lru_state[lru_table_word(place)]);
+        if (found == 0u || found == block + 1u) {
+            return found != 0u;
+        }
+        place = lru_next_place(place, probe);
+    }
+    return false;
+}
+
 fn serve_leader() -> u32 {
     let count = min(atomicLoad(&lru_state[LRU_LEADER_COUNT]), min(LRU_LEADER_CAPACITY, params.slots));
     for (var i = 0u; i < count; i++) {
-        let entry = leader_entry(i);
-        if (entry >= LRU_FIRST_SLOT) {
-            atomicStore(&lru_state[lru_stamp_word(entry - LRU_FIRST_SLOT)], LRU_PINNED);
+        let slot = lru_lookup(leader_block(i));
+        if (slot != LRU_MISSING) {
+            atomicStore(&lru_state[lru_stamp_word(slot)], LRU_PINNED);
         }
     }
     var served = 0u;
     for (var i = 0u; i < count; i++) {
-        let entry = leader_entry(i);
-        if (entry < LRU_FIRST_SLOT) {
+        let block = leader_block(i);
+        if (lru_lookup(block) == LRU_MISSING) {
             // What others requested, too, is counted with the list.
-            atomicAdd(&lru_state[LRU_REQUESTED_TOTAL], u32(entry == LRU_ABSENT));
-            let block = atomicLoad(&lru_state[LRU_LEADER + i]);
-            var slot = block;
-            if (!lru_holds_all()) {
-                slot = leader_victim();
-            }
-            lru_place(block, slot, LRU_PINNED);
+            atomicAdd(&lru_state[LRU_REQUESTED_TOTAL], u32(!is_requested(block)));
+            let slot = leader_slot();
+            lru_insert(block, slot, LRU_PINNED);
             jobs[served] = vec2<u32>(block, slot);
             served++;
         }
     }
+    // Pinned slots become slots in use, which no search takes.
     let clock = atomicLoad(&lru_state[LRU_CLOCK]);
     for (var i = 0u; i < count; i++) {
-        atomicStore(&lru_state[lru_stamp_word(leader_entry(i) - LRU_FIRST_SLOT)], clock);
+        atomicStore(&lru_state[lru_stamp_word(lru_lookup(leader_block(i)))], clock);
     }
     return served;
+}
+
+// Arguments of a dispatch with one invocation for each of `count` things.
+fn write_args(place: u32, count: u32) {
+    let groups = indirect_fold(indirect_div_ceil(count, 64u));
+    control[3u * place] = groups.x;
+    control[3u * place + 1u] = groups.y;
+    control[3u * place + 2u] = groups.z;
 }
 
 @compute @workgroup_size(1)
 fn main() {
     let served = serve_leader();
     atomicStore(&lru_state[LRU_JOB_COUNT], served);
-    let requests = lru_requests();
-    let search_nothing = requests == 0u || lru_holds_all();
-    let window = select(min(2u * requests + 256u, params.window_capacity), 0u, search_nothing);
-    let search = indirect_fold((window + 63u) / 64u);
-    let assign = indirect_fold((requests + 63u) / 64u);
-    control[0] = search.x;
-    control[1] = search.y;
-    control[2] = search.z;
-    control[3] = window;
-    control[4] = assign.x;
-    control[5] = assign.y;
-    control[6] = assign.z;
+    write_args(0u, lru_window());                              // search
+    write_args(1u, atomicLoad(&lru_state[LRU_REQUEST_COUNT])); // assign
+    write_args(2u, lru_wanted());                              // unlink
+    write_args(3u, lru_requests());                            // insert
 }

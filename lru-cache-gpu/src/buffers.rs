@@ -1,6 +1,6 @@
 //! Memory of one cache.
 
-use gpu_primitives::compact::{Compact, CompactBuffers};
+use gpu_primitives::kernel::Kernel;
 use gpu_primitives::memory::{Buffer, Category, Ledger};
 use gpu_primitives::wgpu;
 
@@ -17,7 +17,6 @@ pub struct CacheBuffers {
     pub(crate) jobs: Buffer,
     pub(crate) control: Buffer,
     pub(crate) decode_args: Buffer,
-    pub(crate) compact: CompactBuffers,
     pub(crate) binds: Binds,
     _scratch: Vec<Buffer>,
 }
@@ -26,9 +25,12 @@ pub struct CacheBuffers {
 #[derive(Debug)]
 pub(crate) struct Binds {
     pub(crate) begin_frame: wgpu::BindGroup,
+    pub(crate) reset_user_words: wgpu::BindGroup,
     pub(crate) lead: wgpu::BindGroup,
     pub(crate) search: wgpu::BindGroup,
     pub(crate) assign: wgpu::BindGroup,
+    pub(crate) unlink: wgpu::BindGroup,
+    pub(crate) insert: wgpu::BindGroup,
     pub(crate) finish: wgpu::BindGroup,
 }
 
@@ -54,28 +56,13 @@ impl CacheBuffers {
             .pages()
             .map(|count| buffer(Category::Slots, "lru.slots", count * SLOT_BYTES, storage))
             .collect();
-        let directory =
-            buffer(Category::Directory, "lru.directory", plan.block_directory_bytes(), storage);
+        let directory = buffer(Category::Directory, "lru.directory", plan.table_bytes(), storage);
         let state = buffer(Category::Directory, "lru.state", plan.state_bytes(), storage);
-        let jobs = scratch("lru.jobs", 8 * plan.job_capacity());
+        let jobs = scratch("lru.jobs", plan.job_bytes());
+        let victims = scratch("lru.victims", plan.victim_bytes());
         let args_usage = storage | Usage::INDIRECT;
         let control = buffer(Category::Scratch, "lru.control", CONTROL_BYTES, args_usage);
         let decode_args = buffer(Category::Scratch, "lru.decode_args", ARGS_BYTES, args_usage);
-        let is_victim = scratch("lru.is_victim", 4 * plan.window_capacity());
-        let searched = scratch("lru.searched", 4 * plan.window_capacity());
-        let victims = scratch("lru.victims", 4 * plan.window_capacity());
-        let victim_count = scratch("lru.victim_count", ARGS_BYTES);
-        let compact = CompactBuffers::new(
-            device,
-            ledger,
-            &service.compact,
-            &Compact::plan(plan.window_capacity()),
-            &is_victim,
-            &searched,
-            (&control, 12),
-            &victims,
-            (&victim_count, 0),
-        );
         let uniform = |label, bytes: &[u8]| {
             ledger.buffer_with(device, Category::Params, label, Usage::UNIFORM, bytes)
         };
@@ -83,29 +70,25 @@ impl CacheBuffers {
         let params = uniform("lru.params", bytemuck::bytes_of::<LruParams>(&lru));
         let finish_params = FinishParams::new(lru, jobs_per_group);
         let finish_params = uniform("lru.finish_params", bytemuck::bytes_of(&finish_params));
-        let bind = |kernel: &gpu_primitives::kernel::Kernel, params: &Buffer, rest: &[&Buffer]| {
-            let resources: Vec<_> = [params, &directory, &state]
-                .into_iter()
-                .chain(rest.iter().copied())
-                .map(|b| b.as_entire_binding())
-                .collect();
+        let bind = |kernel: &Kernel, buffers: &[&Buffer]| {
+            let resources: Vec<_> = buffers.iter().map(|b| b.as_entire_binding()).collect();
             kernel.bind(device, "lru", &resources)
         };
         let kernels = &service.kernels;
+        let (d, s) = (&directory, &state);
         let binds = Binds {
-            begin_frame: bind(&kernels.begin_frame, &params, &[]),
-            lead: bind(&kernels.lead, &params, &[&jobs, &control]),
-            search: bind(&kernels.search, &params, &[&control, &is_victim, &searched]),
-            assign: bind(&kernels.assign, &params, &[&victims, &victim_count, &jobs]),
-            finish: bind(
-                &kernels.finish,
-                &finish_params,
-                &[&control, &victims, &victim_count, &decode_args],
-            ),
+            begin_frame: bind(&kernels.begin_frame, &[&params, d, s]),
+            reset_user_words: bind(&kernels.reset_user_words, &[&params, d]),
+            lead: bind(&kernels.lead, &[&params, d, s, &jobs, &control]),
+            search: bind(&kernels.search, &[&params, d, s, &victims]),
+            assign: bind(&kernels.assign, &[&params, d, s, &victims, &jobs]),
+            unlink: bind(&kernels.unlink, &[&params, d, s, &victims]),
+            insert: bind(&kernels.insert, &[&params, d, s, &victims, &jobs]),
+            finish: bind(&kernels.finish, &[&finish_params, d, s, &decode_args]),
         };
-        let _scratch = vec![is_victim, searched, victims, victim_count, params, finish_params];
+        let _scratch = vec![victims, params, finish_params];
         let plan = plan.clone();
-        Self { plan, slots, directory, state, jobs, control, decode_args, compact, binds, _scratch }
+        Self { plan, slots, directory, state, jobs, control, decode_args, binds, _scratch }
     }
 
     /// The plan these buffers were made from.
@@ -118,12 +101,13 @@ impl CacheBuffers {
         &self.slots
     }
 
-    /// One u32 per block: 0 absent, 1 requested, otherwise the slot + 2.
+    /// Hash table from block to slot and the user words, as laid out in
+    /// `shader/lib/lru_directory.wgsl`.
     pub fn directory(&self) -> &wgpu::Buffer {
         &self.directory
     }
 
-    /// Header, owners, stamps and requests, as laid out in `shader/lib/lru_state.wgsl`.
+    /// Header, stamps and requests, as laid out in `shader/lib/lru_state.wgsl`.
     pub fn state(&self) -> &wgpu::Buffer {
         &self.state
     }
@@ -135,7 +119,7 @@ impl CacheBuffers {
 
     /// Where the number of jobs is: a u32 at this byte offset of [`CacheBuffers::state`].
     pub fn job_count(&self) -> (&wgpu::Buffer, u64) {
-        (&self.state, 4 * crate::service::JOB_COUNT_WORD)
+        (&self.state, 4 * crate::layout::JOB_COUNT as u64)
     }
 
     /// Arguments of the decode dispatch, three u32 at offset 0.

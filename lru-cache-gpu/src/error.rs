@@ -16,24 +16,15 @@ pub enum Error {
         /// Bytes given.
         available: u64,
     },
-    /// A volume that is resident as a whole must fit the pages that a kernel binds.
-    #[error("{blocks} blocks cannot all be resident, the device's limits allow {most}")]
+    /// The blocks must be numbered in 32 bits and, where they are resident as a whole, fit the pages
+    /// that a kernel binds.
+    #[error(
+        "a volume of {blocks} blocks has more than the {most} that can be numbered or resident"
+    )]
     TooManyBlocks {
         /// Blocks of the volume.
         blocks: u64,
-        /// Most blocks under the device's limits.
+        /// Most blocks.
         most: u64,
-    },
-    /// The directory must fit one binding.
-    #[error(
-        "the directory of {blocks} blocks needs a binding of {needed} bytes, the device binds at most {available}"
-    )]
-    DirectoryTooLarge {
-        /// Blocks of the volume.
-        blocks: u64,
-        /// Bytes of the directory.
-        needed: u64,
-        /// Largest storage binding of the device in bytes.
-        available: u64,
     },
 }

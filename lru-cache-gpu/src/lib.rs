@@ -3,6 +3,7 @@
 mod buffers;
 pub mod cpu;
 mod error;
+mod layout;
 mod plan;
 mod resident;
 mod service;

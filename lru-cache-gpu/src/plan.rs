@@ -1,31 +1,28 @@
 //! Sizes, before anything is allocated.
 
 use bytemuck::{Pod, Zeroable};
-use gpu_primitives::compact::Compact;
 use gpu_primitives::wgpu;
 
 use crate::Error;
+use crate::layout::{ENTRY_WORDS, HEADER};
 
 /// Bytes of a slot: 64 samples of 4 bytes.
 pub const SLOT_BYTES: u64 = 256;
 
 /// Most pages of slots: a walking kernel binds them all and has 8 storage buffers.
-pub const MAX_PAGES: u64 = 3;
+pub const MAX_PAGES: u64 = 4;
 
 /// Blocks whose samples one dual cell can need, hence the fewest slots that guarantee progress.
 const LEADER_BLOCKS: u64 = 8;
 
-/// Words of the header of the state, as in `shader/lib/lru_state.wgsl`.
-pub(crate) const HEADER_WORDS: u64 = 24;
+/// Most slots: indices of the directory's words, at most 6 for each slot, are 32 bits long.
+const MAX_SLOTS: u64 = 1 << 28;
 
 /// Requests served in one round at most.
-const MAX_REQUESTS: u64 = 1 << 17;
+const MAX_REQUESTS: u64 = 1 << 16;
 
-/// Slots searched for victims in one round at most.
-const MAX_WINDOW: u64 = 2 * MAX_REQUESTS;
-
-/// Bytes of the buffer of indirect arguments and the search window.
-pub(crate) const CONTROL_BYTES: u64 = 32;
+/// Bytes of the indirect arguments of the service's own dispatches.
+pub(crate) const CONTROL_BYTES: u64 = 48;
 
 /// Bytes of the decode dispatch's arguments.
 pub(crate) const ARGS_BYTES: u64 = 16;
@@ -33,7 +30,7 @@ pub(crate) const ARGS_BYTES: u64 = 16;
 /// Bytes of the two uniforms.
 pub(crate) const PARAMS_BYTES: u64 = 16 + 32;
 
-/// Uniform struct of `shader/lib/lru_state.wgsl`, for walking kernels to embed in theirs.
+/// Uniform struct of `shader/lib/lru_params.wgsl`, for walking kernels to embed in theirs.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 pub struct LruParams {
@@ -41,10 +38,10 @@ pub struct LruParams {
     pub slots: u32,
     /// Slots per page.
     pub slots_per_page: u32,
-    /// Requests that the list holds.
+    /// Requests served in one round.
     pub request_capacity: u32,
-    /// Slots that one search for victims looks at, at most.
-    pub window_capacity: u32,
+    /// Chains of the directory, a power of two.
+    pub heads: u32,
 }
 
 /// Sizes of everything this crate allocates for one volume.
@@ -60,13 +57,14 @@ impl CachePlan {
     /// more slots than there are blocks.
     ///
     /// # Errors
-    /// If the directory exceeds a binding, or `bytes` is less than [`CachePlan::minimum_bytes`].
+    /// If there are too many blocks, or `bytes` is less than [`CachePlan::minimum_bytes`].
     pub fn fit(blocks: u64, bytes: u64, limits: &wgpu::Limits) -> Result<Self, Error> {
-        Self::fit_beside(blocks, bytes, limits, |_| 0)
+        Self::fit_beside(blocks, bytes, limits, MAX_PAGES, |_| 0)
     }
 
-    /// Like [`CachePlan::fit`] where others allocate memory of their own, `beside(slots)` bytes, a
-    /// function that does not decrease with the number of slots.
+    /// Like [`CachePlan::fit`] with at most `most_pages` pages of slots, 1 to [`MAX_PAGES`], where
+    /// others allocate memory of their own, `beside(slots)` bytes, a function that does not
+    /// decrease with the number of slots.
     ///
     /// # Errors
     /// As [`CachePlan::fit`]; the minimum includes what the others need.
@@ -74,16 +72,16 @@ impl CachePlan {
         blocks: u64,
         bytes: u64,
         limits: &wgpu::Limits,
+        most_pages: u64,
         beside: impl Fn(u64) -> u64,
     ) -> Result<Self, Error> {
-        let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        let directory = blocks * 4;
-        if directory > binding {
-            return Err(Error::DirectoryTooLarge { blocks, needed: directory, available: binding });
+        let most_blocks = u64::from(u32::MAX);
+        if blocks > most_blocks {
+            return Err(Error::TooManyBlocks { blocks, most: most_blocks });
         }
-        let state_slots = Self::slots_of_a_state(binding);
+        let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let slots_per_page = (binding / SLOT_BYTES).max(1);
-        let most = blocks.min(slots_per_page * MAX_PAGES).min(state_slots);
+        let most = blocks.min(slots_per_page * most_pages.clamp(1, MAX_PAGES)).min(MAX_SLOTS);
         let with = |slots| Self { blocks, slots, slots_per_page };
         let needed = |slots| with(slots).bytes() + beside(slots);
         let least = Self::least_slots(blocks);
@@ -91,11 +89,12 @@ impl CachePlan {
         if minimum > bytes {
             return Err(Error::TooFewBytes { blocks, minimum, available: bytes });
         }
-        // needed() does not decrease with slots: the largest fitting count, by bisection.
+        let fit = |slots| needed(slots) <= bytes && with(slots).largest_table() <= binding;
+        // No size decreases with the number of slots: the largest that fits, by bisection.
         let (mut fits, mut beyond) = (least, most.max(least) + 1);
         while beyond - fits > 1 {
             let middle = fits + (beyond - fits) / 2;
-            if needed(middle) <= bytes {
+            if fit(middle) {
                 fits = middle;
             } else {
                 beyond = middle;
@@ -104,11 +103,9 @@ impl CachePlan {
         Ok(with(fits))
     }
 
-    /// Most slots whose state (two words each, and the requests) fits one binding.
-    fn slots_of_a_state(binding: u64) -> u64 {
-        let words = (binding / 4).saturating_sub(HEADER_WORDS);
-        // Each slot adds a request, too, until the list is as long as it gets.
-        if words <= 3 * MAX_REQUESTS { words / 3 } else { (words - MAX_REQUESTS) / 2 }
+    /// Bytes of the largest buffer but the pages of slots.
+    fn largest_table(&self) -> u64 {
+        self.table_bytes().max(self.state_bytes()).max(self.job_bytes())
     }
 
     /// Slots of the smallest cache for a volume of `blocks` blocks.
@@ -137,7 +134,7 @@ impl CachePlan {
         self.pages().count() as u32
     }
 
-    /// Requests that the list holds.
+    /// Requests served in one round at most.
     pub fn request_capacity(&self) -> u64 {
         self.slots.min(MAX_REQUESTS)
     }
@@ -147,8 +144,16 @@ impl CachePlan {
         self.request_capacity() + LEADER_BLOCKS
     }
 
-    pub(crate) fn window_capacity(&self) -> u64 {
-        self.slots.min(MAX_WINDOW)
+    /// Chains of the directory: the power of two next to the number of slots, at most 1.34 times
+    /// as many.
+    fn heads(&self) -> u64 {
+        let above = self.slots.next_power_of_two();
+        if 100 * above <= 134 * self.slots { above } else { above / 2 }
+    }
+
+    /// Places of the request table, and room of the request list.
+    pub(crate) fn table_places(&self) -> u64 {
+        (2 * self.request_capacity()).next_power_of_two()
     }
 
     /// Uniform for walking kernels.
@@ -157,7 +162,7 @@ impl CachePlan {
             slots: self.slots as u32,
             slots_per_page: self.slots_per_page.min(self.slots) as u32,
             request_capacity: self.request_capacity() as u32,
-            window_capacity: self.window_capacity() as u32,
+            heads: self.heads() as u32,
         }
     }
 
@@ -166,29 +171,31 @@ impl CachePlan {
         self.slots * SLOT_BYTES
     }
 
-    /// Bytes of the directory and of the slots' owners, stamps and the request list.
+    /// Bytes of the directory, the slots' stamps, and the requests.
     pub fn directory_bytes(&self) -> u64 {
-        self.blocks * 4 + self.state_bytes()
+        self.table_bytes() + self.state_bytes()
     }
 
-    pub(crate) fn block_directory_bytes(&self) -> u64 {
-        self.blocks * 4
+    /// Bytes of the hash table from block to slot.
+    pub(crate) fn table_bytes(&self) -> u64 {
+        4 * (self.heads() + ENTRY_WORDS as u64 * self.slots)
     }
 
     pub(crate) fn state_bytes(&self) -> u64 {
-        4 * (HEADER_WORDS + 2 * self.slots + self.request_capacity())
+        4 * (HEADER as u64 + self.slots + 2 * self.table_places())
     }
 
-    /// Bytes of the search for victims, the job list, arguments and uniforms.
+    pub(crate) fn victim_bytes(&self) -> u64 {
+        4 * self.request_capacity()
+    }
+
+    pub(crate) fn job_bytes(&self) -> u64 {
+        8 * self.job_capacity()
+    }
+
+    /// Bytes of the victims, the job list, arguments and uniforms.
     pub fn scratch_bytes(&self) -> u64 {
-        let window = self.window_capacity();
-        let compact = Compact::plan(window).bytes();
-        3 * 4 * window
-            + compact
-            + 8 * self.job_capacity()
-            + CONTROL_BYTES
-            + 2 * ARGS_BYTES
-            + PARAMS_BYTES
+        self.victim_bytes() + self.job_bytes() + CONTROL_BYTES + ARGS_BYTES + PARAMS_BYTES
     }
 
     /// Everything together.
@@ -225,11 +232,29 @@ mod tests {
     }
 
     #[test]
-    fn refuses_a_directory_beyond_a_binding() {
-        assert!(matches!(
-            CachePlan::fit(125_829_120, 1 << 40, &wgpu::Limits::default()),
-            Err(Error::DirectoryTooLarge { .. })
-        ));
+    fn memory_follows_the_slots_and_not_the_blocks() {
+        for slots in (1..=1000).chain((0..23).flat_map(|i| [(1 << i) - 1, 1 << i, (3 << i) / 4])) {
+            let slots: u64 = slots.max(1);
+            let of = |blocks| CachePlan { blocks, slots, slots_per_page: 1 << 19 };
+            let plan = of(slots);
+            assert!(plan.bytes() <= (256 + 26) * slots + 2_500_000, "{slots} slots");
+            assert_eq!(plan.bytes(), of(u64::from(u32::MAX)).bytes());
+            let heads = plan.params().heads;
+            assert!(heads.is_power_of_two());
+            assert!((0.66..=1.34).contains(&(f64::from(heads) / slots as f64)), "{slots} slots");
+            let one_more = CachePlan { slots: slots + 1, ..plan.clone() };
+            assert!(one_more.bytes() > plan.bytes() && one_more.heads() >= plan.heads());
+        }
+    }
+
+    #[test]
+    fn blocks_are_numbered_in_32_bits() {
+        let (limits, most) = (wgpu::Limits::default(), u64::from(u32::MAX));
+        assert_eq!(CachePlan::fit(most, 4 << 20, &limits).unwrap().blocks, most);
+        assert_eq!(
+            CachePlan::fit(most + 1, 4 << 20, &limits),
+            Err(Error::TooManyBlocks { blocks: most + 1, most })
+        );
     }
 
     #[test]

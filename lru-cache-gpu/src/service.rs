@@ -1,21 +1,18 @@
 //! Serving a round's requests.
 
 use bytemuck::{Pod, Zeroable};
-use gpu_primitives::compact::Compact;
 use gpu_primitives::kernel::{Binding, Kernel, KernelSource};
 use gpu_primitives::wgsl::{Module, compose_fixed};
 use gpu_primitives::{indirect, wgpu};
 
-use crate::plan::{CONTROL_BYTES, HEADER_WORDS, LruParams};
+use crate::layout::{HEADER, REQUESTED_TOTAL};
+use crate::plan::{CONTROL_BYTES, LruParams};
 use crate::{CacheBuffers, wgsl};
 
-const HEADER_BYTES: u64 = 4 * HEADER_WORDS;
+const HEADER_BYTES: u64 = 4 * HEADER as u64;
 
-/// Word of the header that counts the jobs of the running round.
-pub(crate) const JOB_COUNT_WORD: u64 = 6;
-
-/// First of the counters' words in the header.
-const COUNTER_WORD: u64 = 8;
+/// Slots of one workgroup of the kernels that go over slots.
+const SLOTS_PER_GROUP: u64 = 64;
 
 /// Uniform of `shader/finish.wgsl`.
 #[repr(C)]
@@ -52,96 +49,72 @@ pub struct Counters {
 
 impl Counters {
     /// Where the counters are in [`CacheBuffers::state`]: byte offset and length.
-    pub const BYTES: (u64, u64) = (4 * COUNTER_WORD, size_of::<Counters>() as u64);
+    pub const BYTES: (u64, u64) = (4 * REQUESTED_TOTAL as u64, size_of::<Counters>() as u64);
 }
 
 /// The stage that serves requests. Immutable; used with any number of caches.
 #[derive(Debug)]
 pub struct Service {
     pub(crate) kernels: Kernels,
-    pub(crate) compact: Compact,
 }
 
 #[derive(Debug)]
 pub(crate) struct Kernels {
     pub(crate) begin_frame: Kernel,
+    pub(crate) reset_user_words: Kernel,
     pub(crate) lead: Kernel,
     pub(crate) search: Kernel,
     pub(crate) assign: Kernel,
+    pub(crate) unlink: Kernel,
+    pub(crate) insert: Kernel,
     pub(crate) finish: Kernel,
 }
 
-fn source(
-    label: &'static str,
-    name: &'static str,
-    text: &'static str,
-    params_bytes: u64,
-    rest: &[Binding],
-) -> KernelSource {
-    let mut bindings = vec![
-        Binding::Uniform { bytes: params_bytes },
-        Binding::StorageReadWrite { min_bytes: 4 },
-        Binding::StorageReadWrite { min_bytes: HEADER_BYTES },
-    ];
-    bindings.extend_from_slice(rest);
-    let wgsl = compose_fixed(
-        Module { name, source: text },
-        &[wgsl::PARAMS, wgsl::STATE, indirect::MODULE],
-        &[],
-    );
-    KernelSource { label, wgsl, entry_point: "main", bindings }
+fn source(label: &'static str, module: Module, bindings: Vec<Binding>) -> KernelSource {
+    let mut modules = wgsl::MODULES.to_vec();
+    modules.extend([wgsl::SERVICE, indirect::MODULE]);
+    KernelSource {
+        label,
+        wgsl: compose_fixed(module, &modules, &[]),
+        entry_point: "main",
+        bindings,
+    }
+}
+
+macro_rules! module {
+    ($name:literal) => {
+        Module { name: $name, source: include_str!(concat!("../shader/", $name, ".wgsl")) }
+    };
 }
 
 impl Service {
     /// Makes the pipelines.
     pub fn new(device: &wgpu::Device) -> Self {
-        let [begin_frame, lead, search, assign, finish] = Self::sources().map(|s| s.kernel(device));
-        let kernels = Kernels { begin_frame, lead, search, assign, finish };
-        Self { kernels, compact: Compact::new(device) }
+        let [begin_frame, reset_user_words, lead, search, assign, unlink, insert, finish] =
+            Self::sources().map(|s| s.kernel(device));
+        let kernels =
+            Kernels { begin_frame, reset_user_words, lead, search, assign, unlink, insert, finish };
+        Self { kernels }
     }
 
     /// Texts and bindings of the kernels.
-    pub fn sources() -> [KernelSource; 5] {
-        let lru = size_of::<LruParams>() as u64;
-        let finish = size_of::<FinishParams>() as u64;
+    pub fn sources() -> [KernelSource; 8] {
+        let params = Binding::Uniform { bytes: size_of::<LruParams>() as u64 };
+        let finish_params = Binding::Uniform { bytes: size_of::<FinishParams>() as u64 };
         let read = |min_bytes| Binding::StorageRead { min_bytes };
         let write = |min_bytes| Binding::StorageReadWrite { min_bytes };
+        let (directory, state) = (write(4), write(HEADER_BYTES));
+        let on_cache = |rest: &[Binding]| [&[params, directory, state], rest].concat();
+        let finish = vec![finish_params, directory, state, write(12)];
         [
-            source(
-                "lru.begin_frame",
-                "begin_frame",
-                include_str!("../shader/begin_frame.wgsl"),
-                lru,
-                &[],
-            ),
-            source(
-                "lru.lead",
-                "lead",
-                include_str!("../shader/lead.wgsl"),
-                lru,
-                &[write(8), write(CONTROL_BYTES)],
-            ),
-            source(
-                "lru.search",
-                "search",
-                include_str!("../shader/search.wgsl"),
-                lru,
-                &[read(CONTROL_BYTES), write(4), write(4)],
-            ),
-            source(
-                "lru.assign",
-                "assign",
-                include_str!("../shader/assign.wgsl"),
-                lru,
-                &[read(4), read(4), write(8)],
-            ),
-            source(
-                "lru.finish",
-                "finish",
-                include_str!("../shader/finish.wgsl"),
-                finish,
-                &[read(CONTROL_BYTES), read(4), read(4), write(12)],
-            ),
+            source("lru.begin_frame", module!("begin_frame"), on_cache(&[])),
+            source("lru.reset_user_words", module!("reset_user_words"), vec![params, directory]),
+            source("lru.lead", module!("lead"), on_cache(&[write(8), write(CONTROL_BYTES)])),
+            source("lru.search", module!("search"), on_cache(&[write(4)])),
+            source("lru.assign", module!("assign"), on_cache(&[write(4), write(8)])),
+            source("lru.unlink", module!("unlink"), on_cache(&[read(4)])),
+            source("lru.insert", module!("insert"), on_cache(&[read(4), read(8)])),
+            source("lru.finish", module!("finish"), finish),
         ]
     }
 
@@ -157,18 +130,29 @@ impl Service {
         self.kernels.begin_frame.dispatch(&mut pass, &cache.binds.begin_frame, 1);
     }
 
+    /// Records forgetting what the cache's user keeps with the resident blocks: all user words
+    /// become 0xffffffff, as they are for a block that comes in.
+    pub fn record_reset_user_words(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        cache: &CacheBuffers,
+    ) {
+        let mut pass = begin(encoder, "lru.reset_user_words");
+        let groups = cache.plan.slots().div_ceil(SLOTS_PER_GROUP);
+        self.kernels.reset_user_words.dispatch(&mut pass, &cache.binds.reset_user_words, groups);
+    }
+
     /// Records serving the requests of a round. Afterwards the jobs and the arguments of the decode
     /// dispatch are in place; blocks count as resident, so the decode must follow before any use.
     pub fn record(&self, encoder: &mut wgpu::CommandEncoder, cache: &CacheBuffers) {
-        let (kernels, binds) = (&self.kernels, &cache.binds);
-        {
-            let mut pass = begin(encoder, "lru.search");
-            kernels.lead.dispatch(&mut pass, &binds.lead, 1);
-            kernels.search.dispatch_indirect(&mut pass, &binds.search, &cache.control, 0);
-        }
-        self.compact.record(encoder, &cache.compact);
-        let mut pass = begin(encoder, "lru.assign");
-        kernels.assign.dispatch_indirect(&mut pass, &binds.assign, &cache.control, 16);
+        let (kernels, binds, control) = (&self.kernels, &cache.binds, &cache.control);
+        let mut pass = begin(encoder, "lru.serve");
+        kernels.lead.dispatch(&mut pass, &binds.lead, 1);
+        // Sets of arguments in the order in which shader/lead.wgsl writes them.
+        kernels.search.dispatch_indirect(&mut pass, &binds.search, control, 0);
+        kernels.assign.dispatch_indirect(&mut pass, &binds.assign, control, 12);
+        kernels.unlink.dispatch_indirect(&mut pass, &binds.unlink, control, 24);
+        kernels.insert.dispatch_indirect(&mut pass, &binds.insert, control, 36);
         kernels.finish.dispatch(&mut pass, &binds.finish, 1);
     }
 }
@@ -196,7 +180,7 @@ mod tests {
 
     #[test]
     fn uniforms_lie_where_the_host_writes_them() {
-        let lru = members!(LruParams: slots, slots_per_page, request_capacity, window_capacity);
+        let lru = members!(LruParams: slots, slots_per_page, request_capacity, heads);
         for source in Service::sources() {
             check_struct(&source.wgsl.source, "LruParams", &lru).unwrap();
         }
@@ -208,19 +192,13 @@ mod tests {
         assert_eq!(size_of::<LruParams>() + size_of::<FinishParams>(), PARAMS_BYTES as usize);
     }
 
-    // The header is a list of constants in WGSL, not a struct; the host knows a few of its words.
     #[test]
-    fn the_header_has_the_words_that_the_host_reads() {
-        let [source, ..] = Service::sources();
-        let says = |name: &str, value: u64| {
-            let line = format!("const {name}: u32 = {value}u;");
-            assert!(source.wgsl.source.contains(&line), "{line}");
-        };
-        says("LRU_JOB_COUNT", JOB_COUNT_WORD);
-        says("LRU_HEADER", HEADER_WORDS);
-        let counters = ["REQUESTED", "DECODED", "EVICTED", "DEFERRED", "USED"];
-        for (word, name) in (COUNTER_WORD..).zip(counters) {
-            says(&format!("LRU_{name}_TOTAL"), word);
+    fn counters_follow_each_other_in_the_header() {
+        use crate::layout::{DECODED_TOTAL, DEFERRED_TOTAL, EVICTED_TOTAL, USED_TOTAL};
+        let words = [REQUESTED_TOTAL, DECODED_TOTAL, EVICTED_TOTAL, DEFERRED_TOTAL, USED_TOTAL];
+        let offsets = members!(Counters: requested, decoded, evicted, deferred, used);
+        for (word, (name, offset, _)) in words.into_iter().zip(offsets) {
+            assert_eq!(4 * word as u64, Counters::BYTES.0 + u64::from(offset), "{name}");
         }
         assert_eq!(Counters::BYTES.1, 20);
     }

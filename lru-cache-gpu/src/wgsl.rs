@@ -2,19 +2,23 @@
 
 use gpu_primitives::wgsl::{Constant, Module};
 
-/// Sizes of the cache and the entries of its directory.
+/// Sizes of the cache.
 pub const PARAMS: Module =
     Module { name: "lru_params", source: include_str!("../shader/lib/lru_params.wgsl") };
 
-/// Layout of the cache's state; imports [`PARAMS`].
+/// Layout of the directory; imports [`PARAMS`].
+pub const DIRECTORY: Module =
+    Module { name: "lru_directory", source: include_str!("../shader/lib/lru_directory.wgsl") };
+
+/// Layout of the cache's state; imports [`DIRECTORY`].
 pub const STATE: Module =
     Module { name: "lru_state", source: include_str!("../shader/lib/lru_state.wgsl") };
 
-/// Looking up, touching, requesting, leading; imports [`STATE`].
+/// Looking up, touching, requesting, leading, and reading user words; imports [`STATE`].
 pub const REQUEST: Module =
     Module { name: "lru_request", source: include_str!("../shader/lib/lru_request.wgsl") };
 
-/// Looking up only; imports [`PARAMS`].
+/// Looking up and reading user words only; imports [`DIRECTORY`].
 pub const LOOKUP: Module =
     Module { name: "lru_lookup", source: include_str!("../shader/lib/lru_lookup.wgsl") };
 
@@ -22,14 +26,15 @@ pub const LOOKUP: Module =
 pub const SLOTS: Module =
     Module { name: "lru_slots", source: include_str!("../shader/lib/lru_slots.wgsl") };
 
+/// What the service's own kernels share; imports [`STATE`].
+pub(crate) const SERVICE: Module =
+    Module { name: "lru_service", source: include_str!("../shader/lib/lru_service.wgsl") };
+
 /// Everything a walking kernel needs to import from this crate.
-pub const MODULES: [Module; 5] = [PARAMS, STATE, REQUEST, LOOKUP, SLOTS];
+pub const MODULES: [Module; 6] = [PARAMS, DIRECTORY, STATE, REQUEST, LOOKUP, SLOTS];
 
 /// Constants that fit [`SLOTS`] to a number of slot pages.
 pub fn page_constants(pages: u32) -> [(&'static str, Constant); 3] {
-    [
-        ("LRU_PAGES_2", Constant::Bool(pages >= 2)),
-        ("LRU_PAGES_3", Constant::Bool(pages >= 3)),
-        ("LRU_PAGES_4", Constant::Bool(pages >= 4)),
-    ]
+    [("LRU_PAGES_2", 2), ("LRU_PAGES_3", 3), ("LRU_PAGES_4", 4)]
+        .map(|(name, least)| (name, Constant::Bool(pages >= least)))
 }

@@ -9,6 +9,10 @@
 @group(0) @binding(2) var<storage, read> lru_directory: array<u32>;
 @group(0) @binding(3) var<storage, read_write> slot_counts: array<atomic<u32>>;
 
+fn lru_params() -> LruParams {
+    return frame.lru;
+}
+
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,

@@ -23,6 +23,10 @@
 
 var<workgroup> vertices: array<f32, 125>;
 
+fn lru_params() -> LruParams {
+    return frame.lru;
+}
+
 fn lru_slots_per_page() -> u32 {
     return frame.lru.slots_per_page;
 }

@@ -41,6 +41,10 @@
 
 var<workgroup> hit_count: atomic<u32>;
 
+fn lru_params() -> LruParams {
+    return frame.lru;
+}
+
 fn lru_slots_per_page() -> u32 {
     return frame.lru.slots_per_page;
 }
@@ -48,10 +52,6 @@ fn lru_slots_per_page() -> u32 {
 #ifdef RESIDENT
 #else
 fn block_use(slot: u32) {}
-
-fn block_cell_is_empty(bit: u32) -> bool {
-    return false;
-}
 
 fn block_set_empty(bit: u32) {}
 #endif

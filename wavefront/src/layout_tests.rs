@@ -60,7 +60,7 @@ fn frame_uniforms_have_the_declared_layout() {
         pad1,
     });
     check_struct(&source, "MacrocellGrid", &grid).unwrap();
-    let lru = members!(LruParams { slots, slots_per_page, request_capacity, window_capacity });
+    let lru = members!(LruParams { slots, slots_per_page, request_capacity, heads });
     check_struct(&source, "LruParams", &lru).unwrap();
     assert_eq!(struct_size(&source, "FrameParams"), Ok(size_of::<FrameParams>() as u32));
     let mut wrong = frame;

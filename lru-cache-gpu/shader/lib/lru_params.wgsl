@@ -1,16 +1,11 @@
-// Sizes of the cache and the entries of its directory.
+// Sizes of the cache.
 
 struct LruParams {
     slots: u32,
     slots_per_page: u32,
-    request_capacity: u32,
-    window_capacity: u32,
+    request_capacity: u32, // requests served in one round
+    heads: u32,            // chains of the directory, a power of two
 }
-
-// Directory entries: absent, requested, or a slot + LRU_FIRST_SLOT.
-const LRU_ABSENT: u32 = 0u;
-const LRU_REQUESTED: u32 = 1u;
-const LRU_FIRST_SLOT: u32 = 2u;
 
 // What a look-up gives for a block that is not resident.
 const LRU_MISSING: u32 = 0xffffffffu;

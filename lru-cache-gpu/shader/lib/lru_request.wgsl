@@ -3,8 +3,20 @@
 
 // Slot of a resident block, else LRU_MISSING.
 fn lru_lookup(block: u32) -> u32 {
-    let entry = atomicLoad(&lru_directory[block]);
-    return select(LRU_MISSING, entry - LRU_FIRST_SLOT, entry >= LRU_FIRST_SLOT);
+    var link = atomicLoad(&lru_directory[lru_head_index(block)]);
+    while (link != 0u) {
+        let entry = lru_entry_index(link - 1u);
+        if (atomicLoad(&lru_directory[entry + LRU_BLOCK]) == block + 1u) {
+            return link - 1u;
+        }
+        link = atomicLoad(&lru_directory[entry + LRU_NEXT]);
+    }
+    return LRU_MISSING;
+}
+
+// User word i, 0 or 1, of a slot.
+fn lru_user_word(slot: u32, i: u32) -> u32 {
+    return atomicLoad(&lru_directory[lru_user_index(slot, i)]);
 }
 
 // Keeps the slot for the rest of this round and marks it as used, which counts once per round.
@@ -16,20 +28,35 @@ fn lru_touch(slot: u32) {
     }
 }
 
-// Asks for an absent block, once however many rays ask. A request may fail (list full, or the weak
-// exchange failed for no reason): a ray that needs the block asks again in the next round.
+// Asks for a block that a look-up did not find, once however many rays ask: the first one puts it into
+// the request table. All try a block's places in the same order, and what a place holds stays until
+// the round is served. So a block stands in one place at most: whoever put it further on saw every
+// place before that taken by another block.
+//
+// A request may fail: all places taken, the list full, or the weak exchange failed for no reason. Going
+// on after such a failure could put the block into two places, and trying for ever would rely on
+// others. Nobody waits: a ray that needs the block asks again in the next round.
 fn lru_request(block: u32) {
-    if (atomicLoad(&lru_directory[block]) != LRU_ABSENT) {
-        return;
-    }
-    if (!atomicCompareExchangeWeak(&lru_directory[block], LRU_ABSENT, LRU_REQUESTED).exchanged) {
-        return;
-    }
-    let index = atomicAdd(&lru_state[LRU_REQUEST_COUNT], 1u);
-    if (index < lru_params().request_capacity) {
-        atomicStore(&lru_state[lru_request_word(index)], block);
-    } else {
-        atomicStore(&lru_directory[block], LRU_ABSENT);
+    var place = lru_hash(block) & (lru_table_places() - 1u);
+    for (var probe = 0u; probe < LRU_PROBES; probe++) {
+        let word = lru_table_word(place);
+        var found = atomicLoad(&lru_state[word]);
+        if (found == 0u) {
+            if (atomicLoad(&lru_state[LRU_REQUEST_COUNT]) >= lru_params().request_capacity) {
+                return;
+            }
+            let claim = atomicCompareExchangeWeak(&lru_state[word], 0u, block + 1u);
+            if (claim.exchanged) {
+                let index = atomicAdd(&lru_state[LRU_REQUEST_COUNT], 1u);
+                atomicStore(&lru_state[lru_request_word(index)], place);
+                return;
+            }
+            found = claim.old_value;
+        }
+        if (found == 0u || found == block + 1u) {
+            return;
+        }
+        place = lru_next_place(place, probe);
     }
 }
 

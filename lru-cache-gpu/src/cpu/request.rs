@@ -1,16 +1,10 @@
 //! Twin of `shader/lib/lru_request.wgsl`, for one invocation after the other.
 
 use super::Cache;
-use super::service::{
-    ABSENT, FIRST_SLOT, LEADER, LEADER_CAPACITY, LEADER_COUNT, REQUEST_COUNT, REQUESTED, USED_TOTAL,
-};
+use super::directory::hash;
+use crate::layout::*;
 
 impl Cache {
-    /// Slot of a resident block.
-    pub fn lookup(&self, block: u32) -> Option<u32> {
-        self.directory[block as usize].checked_sub(FIRST_SLOT)
-    }
-
     /// Keeps the slot for the rest of this round and marks it as used.
     pub fn touch(&mut self, slot: u32) {
         let (word, clock) = (self.stamp_word(slot), self.clock());
@@ -20,18 +14,29 @@ impl Cache {
         }
     }
 
-    /// Asks for an absent block.
+    /// Asks for an absent block; fails if the list is full or the block's places are taken.
     pub fn request(&mut self, block: u32) {
-        if self.directory[block as usize] != ABSENT {
-            return;
+        for place in self.places(block) {
+            let word = self.table_word(place);
+            if self.state[word] == block + 1 {
+                return;
+            }
+            if self.state[word] == 0 {
+                let index = self.state[REQUEST_COUNT];
+                if index < self.params.request_capacity {
+                    self.state[word] = block + 1;
+                    self.state[REQUEST_COUNT] += 1;
+                    let word = self.request_word(index);
+                    self.state[word] = place;
+                }
+                return;
+            }
         }
-        let index = self.state[REQUEST_COUNT];
-        self.state[REQUEST_COUNT] += 1;
-        if index < self.params.request_capacity {
-            self.directory[block as usize] = REQUESTED;
-            let word = self.stamp_word(self.params.slots) + index as usize;
-            self.state[word] = block;
-        }
+    }
+
+    /// Whether a block is in the request table.
+    pub fn is_requested(&self, block: u32) -> bool {
+        self.places(block).any(|place| self.state[self.table_word(place)] == block + 1)
     }
 
     /// Says what the leader needs; blocks beyond the first 8 are left out.
@@ -40,5 +45,15 @@ impl Cache {
             self.state[LEADER + index] = block;
             self.state[LEADER_COUNT] = index as u32 + 1;
         }
+    }
+
+    /// Places of the request table that a block may take, in order.
+    fn places(&self, block: u32) -> impl Iterator<Item = u32> + use<> {
+        let mask = self.table_places() - 1;
+        (0..PROBES).scan(hash(block) & mask, move |next, probe| {
+            let place = *next;
+            *next = (place + probe + 1) & mask;
+            Some(place)
+        })
     }
 }

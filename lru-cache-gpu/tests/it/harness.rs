@@ -1,5 +1,7 @@
 //! A cache on the GPU and its twin, driven by the same uses.
 
+use std::collections::hash_map::RandomState;
+use std::hash::BuildHasher;
 use std::sync::OnceLock;
 
 use gpu_primitives::kernel::{Binding, Kernel, KernelSource};
@@ -8,6 +10,8 @@ use gpu_primitives::wgsl::{Module, compose_fixed};
 use gpu_testkit::gpu;
 use lru_cache_gpu::cpu::Cache;
 use lru_cache_gpu::{CacheBuffers, CachePlan, LruParams, Service, wgpu};
+use proptest::prelude::ProptestConfig;
+use proptest::test_runner::RngSeed;
 
 use crate::invariants;
 
@@ -22,8 +26,47 @@ pub(crate) const JOBS_PER_GROUP: u32 = 4;
 pub(crate) enum Op {
     /// Touches the block's slot, or asks for the block.
     Use(u32),
+    /// Asks for the block if it is absent.
     Request(u32),
+    /// Touches the block's slot, if it has one.
     Touch(u32),
+    /// Looks the block up, no more.
+    Look(u32),
+    /// Asks for the block even if it is there, which no ray should.
+    RequestBlindly(u32),
+}
+
+impl Op {
+    pub(crate) fn block(self) -> u32 {
+        let (Op::Use(block)
+        | Op::Request(block)
+        | Op::Touch(block)
+        | Op::Look(block)
+        | Op::RequestBlindly(block)) = self;
+        block
+    }
+
+    /// Whether it touches a resident block's slot.
+    pub(crate) fn touches(self) -> bool {
+        matches!(self, Op::Use(_) | Op::Touch(_))
+    }
+
+    /// Whether it asks for an absent block.
+    pub(crate) fn asks(self) -> bool {
+        matches!(self, Op::Use(_) | Op::Request(_) | Op::RequestBlindly(_))
+    }
+
+    /// As `script.wgsl` reads it.
+    fn word(self) -> u32 {
+        let kind = match self {
+            Op::Use(_) => 0,
+            Op::Request(_) => 1,
+            Op::Touch(_) => 2,
+            Op::Look(_) => 3,
+            Op::RequestBlindly(_) => 4,
+        };
+        (kind << 29) | self.block()
+    }
 }
 
 /// What happens before one service.
@@ -82,13 +125,13 @@ pub(crate) fn play(cache: &mut Cache, round: &Round) -> Served {
     }
     let mut found = Vec::new();
     for &op in &round.ops {
-        let (Op::Use(block) | Op::Request(block) | Op::Touch(block)) = op;
-        found.push(cache.lookup(block));
-        if let (Some(slot), Op::Use(_) | Op::Touch(_)) = (cache.lookup(block), op) {
-            cache.touch(slot);
-        }
-        if !matches!(op, Op::Touch(_)) {
-            cache.request(block);
+        let slot = cache.lookup(op.block());
+        found.push(slot);
+        match slot {
+            Some(slot) if op.touches() => cache.touch(slot),
+            None if op.asks() => cache.request(op.block()),
+            Some(_) if matches!(op, Op::RequestBlindly(_)) => cache.request(op.block()),
+            _ => {}
         }
     }
     cache.lead(&round.leader);
@@ -138,7 +181,7 @@ pub(crate) fn script_source() -> KernelSource {
         bindings: vec![
             Binding::Uniform { bytes: 32 },
             write(4),
-            write(96),
+            write(100),
             Binding::StorageRead { min_bytes: 4 },
             write(4),
         ],
@@ -168,22 +211,28 @@ impl OnGpu {
         copy
     }
 
+    /// Overwrites the directory.
+    pub(crate) fn write_directory(&self, words: &[u32]) {
+        let gpu = gpu();
+        let usage = wgpu::BufferUsages::COPY_SRC;
+        let words = gpu::buffer_with(&gpu.device, bytemuck::cast_slice(words), usage);
+        let mut encoder = gpu.encoder();
+        encoder.copy_buffer_to_buffer(&words, 0, self.buffers.directory(), 0, words.size());
+        gpu.submit(encoder);
+    }
+
     /// Plays the uses, in order or in parallel; the slots that they found.
     pub(crate) fn play(&self, round: &Round, in_order: bool) -> Vec<Option<u32>> {
         let gpu = gpu();
         let mut script = round.leader.clone();
         script.resize(8, u32::MAX);
-        script.extend(round.ops.iter().map(|&op| match op {
-            Op::Use(block) => block,
-            Op::Request(block) => (1 << 30) | block,
-            Op::Touch(block) => (2 << 30) | block,
-        }));
+        script.extend(round.ops.iter().map(|op| op.word()));
         let (count, lru) = (round.ops.len() as u32, self.params);
         let params = [
             lru.slots,
             lru.slots_per_page,
             lru.request_capacity,
-            lru.window_capacity,
+            lru.heads,
             count,
             u32::from(in_order),
             round.leader.len() as u32,
@@ -226,7 +275,8 @@ impl OnGpu {
     }
 }
 
-/// Plays every round on both, requires equal words after each step and checks the invariants.
+/// Plays every round on both, requires equal words before each service and agreement after it, and
+/// checks the invariants.
 pub(crate) struct Lockstep {
     pub(crate) twin: Cache,
     pub(crate) gpu: OnGpu,
@@ -247,14 +297,53 @@ impl Lockstep {
         let found = self.gpu.play(round, true);
         let before = self.gpu.read(&self.twin);
         let jobs = self.gpu.serve();
-        let served = play(&mut self.twin, round);
-        assert_eq!(found, served.found, "slots found");
-        assert_same(&before, &served.before, "before the service");
-        assert_same(&self.gpu.read(&self.twin), &self.twin, "after the service");
-        assert_eq!(sorted(jobs), sorted(served.jobs.clone()), "jobs");
-        invariants::check(&served, &self.twin).unwrap();
+        let after = self.gpu.read(&self.twin);
+        let expected = play(&mut self.twin, round);
+        assert_eq!(found, expected.found, "slots found");
+        assert_same(&before, &expected.before, "before the service");
+        invariants::check(&expected, &self.twin).unwrap();
+        let served = Served { before, found, jobs };
+        assert_agree(&served, &after, &expected, &self.twin);
+        invariants::check(&served, &after).unwrap();
+        // Goes on with what the GPU chose where the choice is open.
+        self.twin = after;
         served
     }
+}
+
+/// Two services of the same round that may differ in which of several possible victims went, and
+/// in who got which slot.
+#[track_caller]
+pub(crate) fn assert_agree(served: &Served, after: &Cache, twin: &Served, twin_after: &Cache) {
+    assert_eq!(after.header(), twin_after.header(), "headers: GPU, twin");
+    assert_eq!(after.request_table(), twin_after.request_table(), "request tables");
+    let led = |served: &Served| -> Vec<[u32; 2]> {
+        let leads = |job: &&[u32; 2]| served.before.leader().contains(&job[0]);
+        served.jobs.iter().filter(leads).copied().collect()
+    };
+    assert_eq!(led(served), led(twin), "the leader's jobs");
+    let first = &served.jobs[..led(served).len()];
+    assert_eq!(first, led(served), "the leader's jobs come first");
+    let blocks = |jobs: &[[u32; 2]]| sorted(jobs.iter().map(|job| job[0]).collect());
+    if twin_after.counters().deferred == twin.before.counters().deferred {
+        assert_eq!(blocks(&served.jobs), blocks(&twin.jobs), "blocks of the jobs");
+    }
+}
+
+/// `cases` runs, or `PROPTEST_CASES`, whose seed is printed when one fails and taken from
+/// `PROPTEST_RNG_SEED` to repeat it.
+pub(crate) fn property(cases: u32) -> ProptestConfig {
+    let mut config = ProptestConfig { failure_persistence: None, ..ProptestConfig::default() };
+    if std::env::var_os("PROPTEST_CASES").is_none() {
+        config.cases = cases;
+    }
+    let seed = match config.rng_seed {
+        RngSeed::Fixed(seed) => seed,
+        RngSeed::Random => RandomState::new().hash_one(cases),
+    };
+    println!("PROPTEST_RNG_SEED={seed}");
+    config.rng_seed = RngSeed::Fixed(seed);
+    config
 }
 
 pub(crate) fn sorted<T: Ord>(mut list: Vec<T>) -> Vec<T> {

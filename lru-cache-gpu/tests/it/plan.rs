@@ -21,9 +21,10 @@ fn the_plan_counts_every_allocated_byte() {
         plan(100_000, 70_001, &Limits::default()),
         plan(300, 65, &small),
         plan(300, 150, &small),
+        plan(300, 256, &small),
     ];
     let pages: Vec<_> = plans.iter().map(CachePlan::page_count).collect();
-    assert_eq!(pages, [1, 1, 1, 1, 1, 2, 3]);
+    assert_eq!(pages, [1, 1, 1, 1, 1, 2, 3, 4]);
     for plan in &plans {
         let cache = OnGpu::new(plan);
         assert_eq!(cache.ledger.total(), plan.bytes(), "{plan:?}");
@@ -42,12 +43,17 @@ fn every_buffer_fits_a_binding() {
     for bytes in [1 << 12, 1 << 14, 1 << 20, (1 << 20) + 4, 1 << 22] {
         let limits = binding(bytes);
         let blocks = bytes / 4;
-        let plan = CachePlan::fit(blocks, 1 << 40, &limits).unwrap();
-        assert!(plan.page_count() as u64 <= MAX_PAGES);
-        assert!(plan.pages().all(|slots| slots * SLOT_BYTES <= bytes));
-        let state = plan.directory_bytes() - 4 * blocks;
-        assert!(state <= bytes, "{state} bytes of state, {bytes} per binding");
-        assert_eq!(plan.slots(), blocks.min(MAX_PAGES * (bytes / SLOT_BYTES)));
+        for most_pages in 1..=MAX_PAGES {
+            let plan = CachePlan::fit_beside(blocks, 1 << 40, &limits, most_pages, |_| 0).unwrap();
+            assert!(u64::from(plan.page_count()) <= most_pages);
+            assert!(plan.pages().all(|slots| slots * SLOT_BYTES <= bytes));
+            assert!(plan.directory_bytes() <= bytes, "{bytes} per binding");
+            assert_eq!(plan.slots(), blocks.min(most_pages * (bytes / SLOT_BYTES)));
+        }
+        assert_eq!(
+            CachePlan::fit(blocks, 1 << 40, &limits),
+            CachePlan::fit_beside(blocks, 1 << 40, &limits, MAX_PAGES, |_| 0)
+        );
     }
 }
 
@@ -56,7 +62,7 @@ fn memory_beside_the_cache_counts_towards_the_bytes() {
     let limits = Limits::default();
     let beside = |slots: u64| 1000 + 12 * slots;
     for bytes in [50_000, 1 << 20, 10_000_000] {
-        let plan = CachePlan::fit_beside(5000, bytes, &limits, beside).unwrap();
+        let plan = CachePlan::fit_beside(5000, bytes, &limits, MAX_PAGES, beside).unwrap();
         assert!(plan.bytes() + beside(plan.slots()) <= bytes);
         let alone = CachePlan::fit(5000, bytes, &limits).unwrap();
         assert!(plan.slots() < alone.slots() || plan.slots() == 5000);
@@ -65,6 +71,7 @@ fn memory_beside_the_cache_counts_towards_the_bytes() {
         assert!(plan.slots() == 5000 || (one_more.slots() > plan.slots() && needed > bytes));
     }
     let minimum = CachePlan::minimum_bytes(5000) + beside(8);
-    assert_eq!(CachePlan::fit_beside(5000, minimum, &limits, beside).unwrap().slots(), 8);
-    assert!(CachePlan::fit_beside(5000, minimum - 1, &limits, beside).is_err());
+    let fit = |bytes| CachePlan::fit_beside(5000, bytes, &limits, MAX_PAGES, beside);
+    assert_eq!(fit(minimum).unwrap().slots(), 8);
+    assert!(fit(minimum - 1).is_err());
 }

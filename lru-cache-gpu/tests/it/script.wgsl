@@ -15,22 +15,25 @@ struct ScriptParams {
 @group(0) @binding(3) var<storage, read> script: array<u32>;
 @group(0) @binding(4) var<storage, read_write> slots_found: array<u32>;
 
+const OP_USE: u32 = 0u;
 const OP_REQUEST: u32 = 1u;
 const OP_TOUCH: u32 = 2u;
+const OP_REQUEST_BLINDLY: u32 = 4u;
 
 fn lru_params() -> LruParams {
     return params.lru;
 }
 
 fn play(index: u32) {
-    let kind = script[8u + index] >> 30u;
-    let block = script[8u + index] & 0x3fffffffu;
+    let kind = script[8u + index] >> 29u;
+    let block = script[8u + index] & 0x1fffffffu;
     let slot = lru_lookup(block);
     slots_found[index] = slot;
-    if (slot != LRU_MISSING && kind != OP_REQUEST) {
+    let missing = slot == LRU_MISSING;
+    if (!missing && (kind == OP_USE || kind == OP_TOUCH)) {
         lru_touch(slot);
     }
-    if (kind != OP_TOUCH) {
+    if ((missing && (kind == OP_USE || kind == OP_REQUEST)) || kind == OP_REQUEST_BLINDLY) {
         lru_request(block);
     }
 }

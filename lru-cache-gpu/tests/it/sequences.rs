@@ -4,7 +4,7 @@ use lru_cache_gpu::cpu::Cache;
 use lru_cache_gpu::wgpu::Limits;
 use proptest::prelude::*;
 
-use crate::harness::{Lockstep, Op, Round, plan, play};
+use crate::harness::{Lockstep, Op, Round, plan, play, property};
 use crate::invariants;
 
 #[derive(Clone, Debug)]
@@ -54,7 +54,7 @@ fn start(sequence: &Sequence) -> Cache {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(256) })]
+    #![proptest_config(property(256))]
 
     #[test]
     fn every_service_keeps_its_promises(sequence in sequence(60, 24)) {
@@ -86,7 +86,7 @@ proptest! {
         let steps: usize = rays.iter().map(Vec::len).sum();
         let mut rounds = 0;
         while let Some(leader) = (0..rays.len()).find(|&ray| done[ray] < rays[ray].len()) {
-            prop_assert!(rounds < 2 * steps, "no progress after {rounds} rounds");
+            prop_assert!(rounds < 2 * steps, "{rounds} rounds for {steps} steps");
             rounds += 1;
             let mut round = Round::default();
             let mut lead = Vec::new();
@@ -113,7 +113,7 @@ proptest! {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(64) })]
+    #![proptest_config(property(64))]
 
     #[test]
     fn the_gpu_and_the_twin_go_in_step(sequence in sequence(120, 6)) {

@@ -9,8 +9,10 @@ use crate::harness::script_source;
 use crate::slots::sample_source;
 
 fn sources() -> Vec<KernelSource> {
-    let tests = [script_source(), sample_source(1), sample_source(2), sample_source(3)];
-    Service::sources().into_iter().chain(tests).collect()
+    let mut sources = vec![script_source()];
+    sources.extend(Service::sources());
+    sources.extend((1..=4).map(sample_source));
+    sources
 }
 
 fn kind(binding: &Binding) -> BindingKind {
@@ -41,13 +43,21 @@ fn shaders_declare_what_is_bound() {
 #[test]
 fn lookup_alone_needs_only_a_read_only_directory() {
     const TEXT: &str = "#import lru_lookup
-        @group(0) @binding(0) var<storage, read> lru_directory: array<u32>;
-        @group(0) @binding(1) var<storage, read_write> out: array<u32>;
-        @compute @workgroup_size(1) fn main() { out[0] = lru_lookup(out[1]); }";
+        @group(0) @binding(0) var<uniform> params: LruParams;
+        @group(0) @binding(1) var<storage, read> lru_directory: array<u32>;
+        @group(0) @binding(2) var<storage, read_write> out: array<u32>;
+        fn lru_params() -> LruParams { return params; }
+        @compute @workgroup_size(1) fn main() {
+            out[0] = lru_lookup(out[1]);
+            out[1] = lru_user_word(out[0], 1u);
+        }";
     let entry = Module { name: "lookup", source: TEXT };
     let text = compose(entry, &wgsl::MODULES, &[]).unwrap().source;
     validate_wgsl(&text).unwrap();
-    let kinds =
-        [BindingKind::StorageRead { min_bytes: 4 }, BindingKind::StorageReadWrite { min_bytes: 4 }];
+    let kinds = [
+        BindingKind::Uniform { bytes: 16 },
+        BindingKind::StorageRead { min_bytes: 4 },
+        BindingKind::StorageReadWrite { min_bytes: 4 },
+    ];
     check_bindings(&text, "main", &kinds).unwrap();
 }

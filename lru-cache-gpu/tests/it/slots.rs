@@ -1,4 +1,4 @@
-//! Samples of resident blocks, over one to three pages.
+//! Samples of resident blocks, over one to four pages.
 
 use gpu_primitives::kernel::{Binding, KernelSource};
 use gpu_primitives::wgsl::{Module, compose_fixed};
@@ -17,6 +17,9 @@ const SAMPLE: &str = "#import lru_slots
 #endif
 #ifdef LRU_PAGES_3
 @group(0) @binding(4) var<storage, read> lru_slots_2: array<f32>;
+#endif
+#ifdef LRU_PAGES_4
+@group(0) @binding(5) var<storage, read> lru_slots_3: array<f32>;
 #endif
 fn lru_slots_per_page() -> u32 {
     return per_page.x;
@@ -45,7 +48,7 @@ pub(crate) fn sample_source(pages: u32) -> KernelSource {
 #[test]
 fn every_sample_of_every_page_is_found() {
     let gpu = gpu();
-    for (pages, slots) in [(1, 5u32), (2, 9), (3, 11), (3, 15)] {
+    for (pages, slots) in [(1, 5u32), (2, 9), (3, 11), (3, 15), (4, 13), (4, 16)] {
         let per_page = slots.div_ceil(pages);
         let samples: Vec<f32> = (0..slots * 64).map(|i| i as f32 + 0.5).collect();
         let buffers: Vec<_> = samples

@@ -33,12 +33,20 @@ fn block_cell_need(cell: vec3<i32>) -> u32 {
     return need;
 }
 
-// Blocks that the samples of all cells lie in that the ray visits in `box` from `start` on.
+// Number of a cell in its block: x + 4y + 16z.
+fn block_cell_bit(cell: vec3<i32>) -> u32 {
+    return u32((cell.x & 3) | ((cell.y & 3) << 2u) | ((cell.z & 3) << 4u));
+}
+
+// Blocks that the samples lie in of all cells that the ray visits in `box` from `start` on and that are not
+// known to be empty.
 fn block_need(ray: DdaRay, start: vec3<i32>, box: DdaBox) -> u32 {
     var need = 0u;
     var cell = start;
     while (all(cell >= box.low) && all(cell <= box.high)) {
-        need |= block_cell_need(cell);
+        if (!block_cell_is_empty(block_cell_bit(cell))) {
+            need |= block_cell_need(cell);
+        }
         cell = block_next(ray, cell, dda_exit(ray, DdaBox(cell, cell)));
     }
     return need;
@@ -68,7 +76,7 @@ fn block_walk(ray: DdaRay, start: CellPlace, box: DdaBox, isovalue: f32) -> Bloc
     walk.place = start;
     while (all(walk.place.cell >= box.low) && all(walk.place.cell <= box.high)) {
         let cell = walk.place.cell;
-        let bit = u32((cell.x & 3) | ((cell.y & 3) << 2u) | ((cell.z & 3) << 4u));
+        let bit = block_cell_bit(cell);
         walk.exit = dda_exit(ray, DdaBox(cell, cell));
         if (!block_cell_is_empty(bit)) {
             if (!block_take(block_cell_need(cell))) {

@@ -205,8 +205,9 @@ impl Stage {
         let samples: Vec<u32> =
             shot.field.blocks(padding).iter().map(|value| value.to_bits()).collect();
         self.store(&mut encoder, &cache.slots()[0], &samples);
-        let directory: Vec<u32> = (0..blocks).map(|block| block + 2).collect();
-        self.store(&mut encoder, cache.directory(), &directory);
+        let mut twin = lru_cache_gpu::cpu::Cache::new(&plan);
+        (0..blocks).for_each(|block| twin.insert(block, block));
+        self.store(&mut encoder, cache.directory(), &twin.directory);
         let view = shot.view();
         let params = view.params(shot.field.grid(), plan.params(), shot.isovalue, 1);
         let identity = glam::DMat4::IDENTITY.to_cols_array_2d();
