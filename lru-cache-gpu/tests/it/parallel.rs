@@ -167,6 +167,20 @@ fn a_full_table_holds_every_block_once() {
     }
 }
 
+#[test]
+fn more_requests_than_one_round_serves() {
+    let (blocks, slots) = (400_000, 70_001);
+    let mut cache = Parallel::new(blocks, slots);
+    assert_eq!(cache.capacity, 1 << 16);
+    for (first, served) in [(0, 1 << 16), (0, (1 << 16) + 4465), (200_000, 70_001)] {
+        let ops = (first..first + 150_000).map(Op::Use).collect();
+        cache.round(&Round { ops, ..Round::default() });
+        assert_eq!(cache.words.next_free(), served);
+    }
+    assert_eq!(cache.words.counters().evicted, 1 << 16);
+    cache.check_lookups();
+}
+
 proptest! {
     #![proptest_config(property(12))]
 
