@@ -60,9 +60,9 @@ fn load_vertex(position: vec3<i32>, i: u32) -> f32 {
 fn intersect(pair: u32, position: vec3<i32>) {
     let id = rays[frame_list_word(frame, pair / pairs[PAIRS_SPECULATION])];
     let ray = frame_ray(frame, frame_pixel(frame, id)).ray;
-    let box = dda_box(position * 4, 2u, frame.grid.last_cell);
+    let box = macrocell_box(frame.grid, position);
     let entry = dda_entry(ray, box);
-    let start = CellPlace(entry, dda_cell_after(ray, entry, box));
+    let start = CellPlace(entry, dda_cell_after(ray, entry, box, dda_first_cells(ray, box)));
     if (block_walk(ray, start, box, frame.isovalue).hit) {
         let block = pairs[PAIRS_HEADER + pair] & PAIR_BLOCK;
         pairs[PAIRS_HEADER + pair] = PAIR_HIT | block;

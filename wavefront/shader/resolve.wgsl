@@ -59,9 +59,9 @@ fn block_set_empty(bit: u32) {}
 // Finds the hit again: the first crossing in the block, whose samples are still resident.
 fn hit_in_block(ray: DdaRay, block: vec3<i32>) -> BlockWalk {
     block_open(block);
-    let box = dda_box(block * 4, 2u, frame.grid.last_cell);
-    let entry = dda_entry(ray, box);
-    return block_walk(ray, CellPlace(entry, dda_cell_after(ray, entry, box)), box, frame.isovalue);
+    let place = macrocell_enter(frame.grid, ray, block);
+    let start = CellPlace(place.event, macrocell_first_cell(frame.grid, ray, place));
+    return block_walk(ray, start, macrocell_box(frame.grid, block), frame.isovalue);
 }
 
 fn resolve(id: u32, block: u32) {
@@ -71,8 +71,8 @@ fn resolve(id: u32, block: u32) {
     let walk = hit_in_block(ray, frame_block_position(frame, block));
     let s = cell_root(walk.bernstein, walk.bracket, walk.inside_low);
     let t = cell_mix(walk.place.event.t, walk.exit.t, s);
-    let low = cell_local(ray, walk.place.event, walk.place.cell);
-    let high = cell_local(ray, walk.exit, walk.place.cell);
+    let low = cell_entry(ray, walk.place.event, walk.place.cell);
+    let high = cell_exit(ray, walk.exit, walk.place.cell);
     let gradient = cell_gradient(walk.corners, low * (1.0 - s) + high * s);
     let along = ray.direction.x * shading.world_x + ray.direction.y * shading.world_y
         + ray.direction.z * shading.world_z;

@@ -25,7 +25,7 @@ fn first_state(grid: MacrocellGrid, ray: DdaRay) -> u32 {
     if (any(grid.last_cell < vec3<i32>(0)) || !dda_meets(ray, volume)) {
         return RAY_DONE;
     }
-    let cell = dda_cell_after(ray, dda_entry(ray, volume), volume);
+    let cell = dda_cell_after(ray, dda_entry(ray, volume), volume, dda_first_cells(ray, volume));
     return RAY_ACTIVE | macrocell_linear(cell >> vec3<u32>(2u), grid.blocks);
 }
 

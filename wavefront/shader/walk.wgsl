@@ -75,8 +75,8 @@ fn request_ahead(grid: MacrocellGrid, ray: DdaRay, start: MacrocellPlace, look_a
             }
         }
         block_open(place.block);
-        let box = macrocell_box(grid, place.block);
-        let need = block_need(ray, dda_cell_after(ray, place.event, box), box);
+        let first = macrocell_first_cell(grid, ray, place);
+        let need = block_need(ray, first, macrocell_box(grid, place.block));
         request(need, leads && ahead == 0u);
     }
 }
@@ -89,7 +89,7 @@ fn walk(grid: MacrocellGrid, ray: DdaRay, first_block: vec3<i32>, look_ahead: u3
         let state = macrocell_linear(place.block, grid.blocks);
         block_open(place.block);
         let box = macrocell_box(grid, place.block);
-        let start = CellPlace(place.event, dda_cell_after(ray, place.event, box));
+        let start = CellPlace(place.event, macrocell_first_cell(grid, ray, place));
         let result = block_walk(ray, start, box, frame.isovalue);
         if (result.hit) {
             return RAY_HIT | state;

@@ -36,7 +36,7 @@ fn walk(grid: MacrocellGrid, ray: DdaRay, first_block: vec3<i32>) -> u32 {
     while (macrocell_inside(grid, place.block)) {
         block_open(place.block);
         let box = macrocell_box(grid, place.block);
-        let start = CellPlace(place.event, dda_cell_after(ray, place.event, box));
+        let start = CellPlace(place.event, macrocell_first_cell(grid, ray, place));
         let result = block_walk(ray, start, box, frame.isovalue);
         if (result.hit) {
             return RAY_HIT | macrocell_linear(place.block, frame.grid.blocks);

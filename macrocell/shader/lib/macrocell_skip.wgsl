@@ -35,39 +35,23 @@ fn macrocell_empty_level(grid: MacrocellGrid, block: vec3<i32>) -> u32 {
     return 4u;
 }
 
-// Whether the block has dual cells. What lies outside the volume has none.
-fn macrocell_inside(grid: MacrocellGrid, block: vec3<i32>) -> bool {
-    return all(block >= vec3<i32>(0)) && all(block * 4 <= grid.last_cell);
-}
-
-// The block's dual cells.
-fn macrocell_box(grid: MacrocellGrid, block: vec3<i32>) -> DdaBox {
-    return dda_box(block * 4, 2u, grid.last_cell);
-}
-
-// The first of the block's dual cells on the ray's way.
-fn macrocell_first_cell(grid: MacrocellGrid, ray: DdaRay, place: MacrocellPlace) -> vec3<i32> {
-    return dda_cell_after(ray, place.event, macrocell_box(grid, place.block));
-}
-
-// The place where the ray enters the block, which it does somewhere.
-fn macrocell_enter(grid: MacrocellGrid, ray: DdaRay, block: vec3<i32>) -> MacrocellPlace {
-    return MacrocellPlace(dda_entry(ray, macrocell_box(grid, block)), block);
-}
-
-// The place after `event`, which leads out of the block.
-fn macrocell_step(ray: DdaRay, block: vec3<i32>, event: DdaEvent) -> MacrocellPlace {
+// Leaves the box of 2^level cells on each axis around the block.
+fn macrocell_leave_box(
+    grid: MacrocellGrid,
+    ray: DdaRay,
+    place: MacrocellPlace,
+    level: u32,
+) -> MacrocellPlace {
+    let box = dda_box(place.block * 4, level, grid.last_cell);
+    let event = dda_exit(ray, box);
     if (event.axis == DDA_START) {
-        // Only a ray without direction stays for ever: it has nothing more to visit.
         return MacrocellPlace(event, vec3<i32>(-1));
     }
-    let step = select(vec3<i32>(1), vec3<i32>(-1), ray.direction < vec3<f32>(0.0));
-    return MacrocellPlace(event, block + select(vec3<i32>(0), step, dda_on_axis(event.axis)));
-}
-
-// Leaves the block.
-fn macrocell_leave(grid: MacrocellGrid, ray: DdaRay, place: MacrocellPlace) -> MacrocellPlace {
-    return macrocell_step(ray, place.block, dda_exit(ray, macrocell_box(grid, place.block)));
+    let own = select(box.low - vec3<i32>(1), box.high + vec3<i32>(1), ray.step > vec3<i32>(0));
+    let cell = dda_cell_after(ray, event, box, own);
+    // The volume may end inside a block.
+    let ends = any(cell > grid.last_cell);
+    return MacrocellPlace(event, select(cell >> vec3<u32>(2u), vec3<i32>(-1), ends));
 }
 
 // Advances to the first active block, or out of the volume.
@@ -78,15 +62,10 @@ fn macrocell_advance(grid: MacrocellGrid, ray: DdaRay, start: MacrocellPlace) ->
         if (level == 0u) {
             break;
         }
-        let box = dda_box(place.block * 4, level, grid.last_cell);
-        let event = dda_exit(ray, box);
-        if (level == 2u || event.axis == DDA_START) {
-            place = macrocell_step(ray, place.block, event);
+        if (level == 2u) {
+            place = macrocell_leave(grid, ray, place);
         } else {
-            let cell = dda_cell_after(ray, event, box);
-            // The volume may end inside a block.
-            let ends = any(cell > grid.last_cell);
-            place = MacrocellPlace(event, select(cell >> vec3<u32>(2u), vec3<i32>(-1), ends));
+            place = macrocell_leave_box(grid, ray, place, level);
         }
     }
     return place;

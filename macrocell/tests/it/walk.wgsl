@@ -36,7 +36,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     var count = 0u;
     if (dda_meets(ray, volume)) {
         let entry = dda_entry(ray, volume);
-        var place = MacrocellPlace(entry, dda_cell_after(ray, entry, volume) >> vec3<u32>(2u));
+        var place = MacrocellPlace(entry, dda_cell_after(ray, entry, volume, dda_first_cells(ray, volume)) >> vec3<u32>(2u));
         while (count < BLOCKS) {
             place = macrocell_advance(params.grid, ray, place);
             if (!macrocell_inside(params.grid, place.block)) {

@@ -47,14 +47,13 @@ fn block_need(ray: DdaRay, start: vec3<i32>, box: DdaBox) -> u32 {
         if (!block_cell_is_empty(block_cell_bit(cell))) {
             need |= block_cell_need(cell);
         }
-        cell = block_next(ray, cell, dda_exit(ray, DdaBox(cell, cell)));
+        cell = block_next(ray, cell, dda_cell_exit(ray, cell));
     }
     return need;
 }
 
 fn block_next(ray: DdaRay, cell: vec3<i32>, exit: DdaEvent) -> vec3<i32> {
-    let step = select(vec3<i32>(1), vec3<i32>(-1), ray.direction < vec3<f32>(0.0));
-    return cell + select(vec3<i32>(0), step, dda_on_axis(exit.axis));
+    return cell + dda_step_on(exit.axis, ray.step);
 }
 
 fn block_corners(cell: vec3<i32>, isovalue: f32) -> CellCorners {
@@ -77,7 +76,7 @@ fn block_walk(ray: DdaRay, start: CellPlace, box: DdaBox, isovalue: f32) -> Bloc
     while (all(walk.place.cell >= box.low) && all(walk.place.cell <= box.high)) {
         let cell = walk.place.cell;
         let bit = block_cell_bit(cell);
-        walk.exit = dda_exit(ray, DdaBox(cell, cell));
+        walk.exit = dda_cell_exit(ray, cell);
         if (!block_cell_is_empty(bit)) {
             if (!block_take(block_cell_need(cell))) {
                 walk.missing = true;
@@ -89,8 +88,8 @@ fn block_walk(ray: DdaRay, start: CellPlace, box: DdaBox, isovalue: f32) -> Bloc
             } else {
                 walk.bernstein = cell_bernstein(
                     walk.corners,
-                    cell_local(ray, walk.place.event, cell),
-                    cell_local(ray, walk.exit, cell),
+                    cell_entry(ray, walk.place.event, cell),
+                    cell_exit(ray, walk.exit, cell),
                 );
                 // The neighbours compute these sides from the same four samples in the same way.
                 walk.inside_low = walk.bernstein.x >= 0.0;

@@ -34,11 +34,20 @@ fn cell_on_one_side(corners: CellCorners) -> bool {
     return (all(low) && all(high)) || !(any(low) || any(high));
 }
 
-// Coordinates in [0, 1]^3 of the ray at `event`; exact on the event's own axis.
-fn cell_local(ray: DdaRay, event: DdaEvent, cell: vec3<i32>) -> vec3<f32> {
+// Coordinates in [0, 1]^3 of the ray at `event`, which leads into the cell or out of it through its
+// sides `own`; exact on the event's own axis.
+fn cell_local(ray: DdaRay, event: DdaEvent, cell: vec3<i32>, own: vec3<i32>) -> vec3<f32> {
     let position = (ray.origin - vec3<f32>(cell)) + event.t * ray.direction;
     let local = clamp(position, vec3<f32>(0.0), vec3<f32>(1.0));
-    return select(local, vec3<f32>(vec3<i32>(event.plane) - cell), dda_on_axis(event.axis));
+    return select(local, vec3<f32>(own), dda_on_axis(event.axis));
+}
+
+fn cell_entry(ray: DdaRay, event: DdaEvent, cell: vec3<i32>) -> vec3<f32> {
+    return cell_local(ray, event, cell, dda_behind(ray));
+}
+
+fn cell_exit(ray: DdaRay, event: DdaEvent, cell: vec3<i32>) -> vec3<f32> {
+    return cell_local(ray, event, cell, ray.ahead);
 }
 
 // Bernstein coefficients along the segment from `a` to `b`: the field's polar form.
