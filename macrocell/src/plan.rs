@@ -14,8 +14,8 @@ const EXTREMA_BYTES: u64 = 64;
 /// Bytes of a coarse cell's range codes.
 pub(crate) const CODE_BYTES: u64 = 128;
 
-/// Most blocks, so that an index leaves two bits for a ray's status.
-const MAX_BLOCKS: u64 = 1 << 30;
+/// Most blocks, so that an index leaves five bits for a ray's status and its misses.
+const MAX_BLOCKS: u64 = 1 << 27;
 
 /// Sizes of everything this crate allocates for one volume.
 #[derive(Debug, Clone, PartialEq, Eq)]

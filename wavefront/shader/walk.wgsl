@@ -23,6 +23,9 @@
 @group(0) @binding(8) var<storage, read> lru_slots_3: array<f32>;
 #endif
 
+// Largest look-ahead of a ray.
+const MOST_AHEAD: u32 = 64u;
+
 fn lru_params() -> LruParams {
     return frame.lru;
 }
@@ -81,22 +84,34 @@ fn request_ahead(grid: MacrocellGrid, ray: DdaRay, start: MacrocellPlace, look_a
     }
 }
 
+// Active blocks that a ray requests in this round: twice as many after every round in which it went on and
+// missed a block again, since the rays that take many rounds graze the surface.
+fn look_ahead(misses: u32, most: u32) -> u32 {
+    if (frame.look_ahead == 1u) {
+        return most;
+    }
+    return min(most << misses, MOST_AHEAD);
+}
+
 // The ray's new state.
-fn walk(grid: MacrocellGrid, ray: DdaRay, first_block: vec3<i32>, look_ahead: u32, leads: bool) -> u32 {
-    var place = macrocell_advance(
-        grid, ray, macrocell_enter(grid, ray, first_block));
+fn walk(grid: MacrocellGrid, ray: DdaRay, state: u32, most: u32, leads: bool) -> u32 {
+    let first = frame_block_position(frame, state & RAY_BLOCK);
+    var place = macrocell_advance(grid, ray, macrocell_enter(grid, ray, first));
     while (macrocell_inside(grid, place.block)) {
-        let state = macrocell_linear(place.block, grid.blocks);
+        let block = macrocell_linear(place.block, grid.blocks);
         block_open(place.block);
         let box = macrocell_box(grid, place.block);
         let start = CellPlace(place.event, macrocell_first_cell(grid, ray, place));
         let result = block_walk(ray, start, box, frame.isovalue);
         if (result.hit) {
-            return RAY_HIT | state;
+            return RAY_HIT | block;
         }
         if (result.missing) {
-            request_ahead(grid, ray, place, look_ahead, leads);
-            return RAY_ACTIVE | state;
+            let before = (state >> RAY_MISSES_SHIFT) & RAY_MOST_MISSES;
+            let went_on = block != (state & RAY_BLOCK);
+            let misses = min(before + u32(went_on), RAY_MOST_MISSES);
+            request_ahead(grid, ray, place, look_ahead(before, most), leads);
+            return RAY_ACTIVE | (misses << RAY_MISSES_SHIFT) | block;
         }
         place = macrocell_advance(
             grid, ray, macrocell_step(ray, place.block, result.place.event));
@@ -116,7 +131,7 @@ fn main(
     }
     let id = rays[frame_list_word(frame, index)];
     let ray = frame_ray(frame, frame_pixel(frame, id)).ray;
-    let block = frame_block_position(frame, rays[RAYS_HEADER + id] & RAY_BLOCK);
-    let look_ahead = frame.look_ahead + frame_zero(id);
-    rays[RAYS_HEADER + id] = walk(frame_grid(frame, id), ray, block, look_ahead, index == 0u);
+    let state = rays[RAYS_HEADER + id];
+    let most = frame.look_ahead + frame_zero(id);
+    rays[RAYS_HEADER + id] = walk(frame_grid(frame, id), ray, state, most, index == 0u);
 }

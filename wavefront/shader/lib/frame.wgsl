@@ -52,12 +52,15 @@ fn frame_grid(frame: FrameParams, loaded: u32) -> MacrocellGrid {
     return grid;
 }
 
-// Status of a ray in the two upper bits of its state; the others hold its block.
+// Status of a ray in the two upper bits of its state; the lower ones hold its block, those between them
+// the number of rounds in which it went on and missed a block.
 const RAY_ACTIVE: u32 = 0u;          // waits for its block, or has not started
 const RAY_HIT: u32 = 0x40000000u;    // has a hit in its block, not shaded yet
 const RAY_DONE: u32 = 0x80000000u;   // final
 const RAY_STATUS: u32 = 0xc0000000u;
-const RAY_BLOCK: u32 = 0x3fffffffu;
+const RAY_BLOCK: u32 = 0x07ffffffu;
+const RAY_MISSES_SHIFT: u32 = 27u;
+const RAY_MOST_MISSES: u32 = 7u;
 
 // The rays' buffer: these words, a state for every number, a bit for every number whose ray is active,
 // and the active list: the numbers of the first active rays.
