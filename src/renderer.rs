@@ -317,10 +317,9 @@ impl ProgressiveIsoRenderer {
         let _span = tracing::debug_span!("progressive_iso.start").entered();
         let (stages, frame) = (&self.stages, &state.frame);
         let isovalue = frame.isovalues[0];
-        let other_isovalue = self.active_isovalue != Some(isovalue);
         let clear = std::mem::take(&mut self.clear_cache);
-        self.samples.record_begin_frame(encoder, &stages.samples, clear, other_isovalue);
-        if other_isovalue {
+        self.samples.record_begin_frame(encoder, &stages.samples, clear);
+        if self.active_isovalue != Some(isovalue) {
             let (ranges, masks) = (&self.ranges, &self.masks);
             stages.activate.record(device, encoder, &mut self.upload, ranges, masks, isovalue);
             self.active_isovalue = Some(isovalue);

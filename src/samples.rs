@@ -134,31 +134,22 @@ impl SampleBuffers {
         }
     }
 
-    /// Records the start of a frame. `clear` forgets what is decoded, `other_isovalue` what is known
-    /// of the cells.
+    /// Records the start of a frame. `clear` forgets what is decoded.
     pub(crate) fn record_begin_frame(
         &self,
         encoder: &mut wgpu::CommandEncoder,
         stages: &SampleStages,
         clear: bool,
-        other_isovalue: bool,
     ) {
-        match (self, stages) {
-            (Self::Cached { cache, counters_before, .. }, SampleStages::Cached { service, .. }) => {
-                if clear {
-                    service.record_clear(encoder, cache);
-                }
-                let (offset, bytes) = Counters::BYTES;
-                encoder.copy_buffer_to_buffer(cache.state(), offset, counters_before, 0, bytes);
-                service.record_begin_frame(encoder, cache);
-                if other_isovalue {
-                    service.record_reset_user_words(encoder, cache);
-                }
+        if let (Self::Cached { cache, counters_before, .. }, SampleStages::Cached { service, .. }) =
+            (self, stages)
+        {
+            if clear {
+                service.record_clear(encoder, cache);
             }
-            (Self::Resident(resident), _) if other_isovalue => {
-                resident.record_forget_cells(encoder);
-            }
-            _ => {}
+            let (offset, bytes) = Counters::BYTES;
+            encoder.copy_buffer_to_buffer(cache.state(), offset, counters_before, 0, bytes);
+            service.record_begin_frame(encoder, cache);
         }
     }
 

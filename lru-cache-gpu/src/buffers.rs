@@ -25,7 +25,6 @@ pub struct CacheBuffers {
 #[derive(Debug)]
 pub(crate) struct Binds {
     pub(crate) begin_frame: wgpu::BindGroup,
-    pub(crate) reset_user_words: wgpu::BindGroup,
     pub(crate) lead: wgpu::BindGroup,
     pub(crate) search: wgpu::BindGroup,
     pub(crate) assign: wgpu::BindGroup,
@@ -78,7 +77,6 @@ impl CacheBuffers {
         let (d, s) = (&directory, &state);
         let binds = Binds {
             begin_frame: bind(&kernels.begin_frame, &[&params, d, s]),
-            reset_user_words: bind(&kernels.reset_user_words, &[&params, d]),
             lead: bind(&kernels.lead, &[&params, d, s, &jobs, &control]),
             search: bind(&kernels.search, &[&params, d, s, &victims]),
             assign: bind(&kernels.assign, &[&params, d, s, &victims, &jobs]),
@@ -101,8 +99,7 @@ impl CacheBuffers {
         &self.slots
     }
 
-    /// Hash table from block to slot and the user words, as laid out in
-    /// `shader/lib/lru_directory.wgsl`.
+    /// Hash table from block to slot, as laid out in `shader/lib/lru_directory.wgsl`.
     pub fn directory(&self) -> &wgpu::Buffer {
         &self.directory
     }

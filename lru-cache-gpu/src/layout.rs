@@ -24,8 +24,7 @@ pub(crate) const PROBES: u32 = 32;
 
 pub(crate) const BLOCK: usize = 0;
 pub(crate) const NEXT: usize = 1;
-pub(crate) const USER: usize = 2;
-pub(crate) const ENTRY_WORDS: usize = 4;
+pub(crate) const ENTRY_WORDS: usize = 2;
 
 #[cfg(test)]
 mod tests {
@@ -64,7 +63,6 @@ mod tests {
             LEADER_CAPACITY,
             BLOCK,
             NEXT,
-            USER,
             ENTRY_WORDS,
         );
         says("PROBES", PROBES as usize);

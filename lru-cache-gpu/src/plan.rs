@@ -15,7 +15,7 @@ pub const MAX_PAGES: u64 = 4;
 /// Blocks whose samples one dual cell can need, hence the fewest slots that guarantee progress.
 const LEADER_BLOCKS: u64 = 8;
 
-/// Most slots: indices of the directory's words, at most 6 for each slot, are 32 bits long.
+/// Most slots: indices of the directory's words, at most 4 for each slot, are 32 bits long.
 const MAX_SLOTS: u64 = 1 << 28;
 
 /// Requests served in one round at most.
@@ -237,7 +237,7 @@ mod tests {
             let slots: u64 = slots.max(1);
             let of = |blocks| CachePlan { blocks, slots, slots_per_page: 1 << 19 };
             let plan = of(slots);
-            assert!(plan.bytes() <= (256 + 26) * slots + 2_500_000, "{slots} slots");
+            assert!(plan.bytes() <= (256 + 18) * slots + 2_500_000, "{slots} slots");
             assert_eq!(plan.bytes(), of(u64::from(u32::MAX)).bytes());
             let heads = plan.params().heads;
             assert!(heads.is_power_of_two());

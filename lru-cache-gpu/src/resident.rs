@@ -7,9 +7,6 @@ use gpu_primitives::wgpu;
 use crate::Error;
 use crate::plan::{LruParams, SLOT_BYTES};
 
-/// Bytes per block for what walking kernels remember of it.
-const CELL_BYTES: u64 = 8;
-
 /// Sizes of a volume that is resident as a whole: block b in slot b.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ResidentPlan {
@@ -21,11 +18,11 @@ impl ResidentPlan {
     /// Plans `blocks` blocks in at most `most_pages` pages.
     ///
     /// # Errors
-    /// [`Error::TooManyBlocks`] if the pages, or a bit for every cell, do not hold them.
+    /// [`Error::TooManyBlocks`] if the pages do not hold them.
     pub fn new(blocks: u64, limits: &wgpu::Limits, most_pages: u64) -> Result<Self, Error> {
         let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let slots_per_page = (binding / SLOT_BYTES).max(1);
-        let most = (slots_per_page * most_pages).min(binding / CELL_BYTES);
+        let most = slots_per_page * most_pages;
         if blocks > most {
             return Err(Error::TooManyBlocks { blocks, most });
         }
@@ -53,9 +50,9 @@ impl ResidentPlan {
         self.slots_per_page as u32
     }
 
-    /// Bytes of all slots and of the cells' bits.
+    /// Bytes of all slots.
     pub fn bytes(&self) -> u64 {
-        self.blocks * (SLOT_BYTES + CELL_BYTES)
+        self.blocks * SLOT_BYTES
     }
 
     /// Uniform for walking kernels.
@@ -73,26 +70,23 @@ impl ResidentPlan {
 pub struct ResidentBuffers {
     plan: ResidentPlan,
     slots: Vec<Buffer>,
-    cells: Buffer,
 }
 
 impl ResidentBuffers {
     /// Allocates the slots, which the caller fills.
     pub fn new(device: &wgpu::Device, ledger: &Ledger, plan: &ResidentPlan) -> Self {
         use wgpu::BufferUsages as Usage;
-        let buffer = |category, label, size| {
-            let usage = Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST;
-            let label = Some(label);
-            let desc = wgpu::BufferDescriptor { label, size, usage, mapped_at_creation: false };
-            ledger.buffer(device, category, &desc)
+        let page = |count: u64| {
+            let desc = wgpu::BufferDescriptor {
+                label: Some("lru.resident.slots"),
+                size: count * SLOT_BYTES,
+                usage: Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST,
+                mapped_at_creation: false,
+            };
+            ledger.buffer(device, Category::Slots, &desc)
         };
-        let slots = plan
-            .pages()
-            .map(|count| buffer(Category::Slots, "lru.resident.slots", count * SLOT_BYTES))
-            .collect();
-        let cells = plan.blocks * CELL_BYTES;
-        let cells = buffer(Category::Directory, "lru.resident.cells", cells);
-        Self { plan: plan.clone(), slots, cells }
+        let slots = plan.pages().map(page).collect();
+        Self { plan: plan.clone(), slots }
     }
 
     /// The plan these buffers were made from.
@@ -103,17 +97,6 @@ impl ResidentBuffers {
     /// Pages of slots: sample `x + 4y + 16z` of slot `s` of a page at `64 s + ..`.
     pub fn slots(&self) -> &[Buffer] {
         &self.slots
-    }
-
-    /// Two words per block: bit `x + 4y + 16z` says that walking kernels found that dual cell on one
-    /// side of the surface.
-    pub fn cells(&self) -> &wgpu::Buffer {
-        &self.cells
-    }
-
-    /// Records forgetting what is known of the cells: another isovalue.
-    pub fn record_forget_cells(&self, encoder: &mut wgpu::CommandEncoder) {
-        encoder.clear_buffer(&self.cells, 0, None);
     }
 }
 
@@ -136,6 +119,6 @@ mod tests {
     fn small_volumes_have_one_page_of_their_own_size() {
         let plan = ResidentPlan::new(7, &wgpu::Limits::default(), 4).unwrap();
         assert_eq!(plan.pages().collect::<Vec<_>>(), [7]);
-        assert_eq!(plan.bytes(), 7 * 264);
+        assert_eq!(plan.bytes(), 7 * 256);
     }
 }

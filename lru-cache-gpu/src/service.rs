@@ -11,9 +11,6 @@ use crate::{CacheBuffers, wgsl};
 
 const HEADER_BYTES: u64 = 4 * HEADER as u64;
 
-/// Slots of one workgroup of the kernels that go over slots.
-const SLOTS_PER_GROUP: u64 = 64;
-
 /// Uniform of `shader/finish.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -61,7 +58,6 @@ pub struct Service {
 #[derive(Debug)]
 pub(crate) struct Kernels {
     pub(crate) begin_frame: Kernel,
-    pub(crate) reset_user_words: Kernel,
     pub(crate) lead: Kernel,
     pub(crate) search: Kernel,
     pub(crate) assign: Kernel,
@@ -90,15 +86,14 @@ macro_rules! module {
 impl Service {
     /// Makes the pipelines.
     pub fn new(device: &wgpu::Device) -> Self {
-        let [begin_frame, reset_user_words, lead, search, assign, unlink, insert, finish] =
+        let [begin_frame, lead, search, assign, unlink, insert, finish] =
             Self::sources().map(|s| s.kernel(device));
-        let kernels =
-            Kernels { begin_frame, reset_user_words, lead, search, assign, unlink, insert, finish };
+        let kernels = Kernels { begin_frame, lead, search, assign, unlink, insert, finish };
         Self { kernels }
     }
 
     /// Texts and bindings of the kernels.
-    pub fn sources() -> [KernelSource; 8] {
+    pub fn sources() -> [KernelSource; 7] {
         let params = Binding::Uniform { bytes: size_of::<LruParams>() as u64 };
         let finish_params = Binding::Uniform { bytes: size_of::<FinishParams>() as u64 };
         let read = |min_bytes| Binding::StorageRead { min_bytes };
@@ -108,7 +103,6 @@ impl Service {
         let finish = vec![finish_params, directory, state, write(12)];
         [
             source("lru.begin_frame", module!("begin_frame"), on_cache(&[])),
-            source("lru.reset_user_words", module!("reset_user_words"), vec![params, directory]),
             source("lru.lead", module!("lead"), on_cache(&[write(8), write(CONTROL_BYTES)])),
             source("lru.search", module!("search"), on_cache(&[write(4)])),
             source("lru.assign", module!("assign"), on_cache(&[write(4), write(8)])),
@@ -128,18 +122,6 @@ impl Service {
     pub fn record_begin_frame(&self, encoder: &mut wgpu::CommandEncoder, cache: &CacheBuffers) {
         let mut pass = begin(encoder, "lru.begin_frame");
         self.kernels.begin_frame.dispatch(&mut pass, &cache.binds.begin_frame, 1);
-    }
-
-    /// Records forgetting what the cache's user keeps with the resident blocks: all user words
-    /// become 0xffffffff, as they are for a block that comes in.
-    pub fn record_reset_user_words(
-        &self,
-        encoder: &mut wgpu::CommandEncoder,
-        cache: &CacheBuffers,
-    ) {
-        let mut pass = begin(encoder, "lru.reset_user_words");
-        let groups = cache.plan.slots().div_ceil(SLOTS_PER_GROUP);
-        self.kernels.reset_user_words.dispatch(&mut pass, &cache.binds.reset_user_words, groups);
     }
 
     /// Records serving the requests of a round. Afterwards the jobs and the arguments of the decode

@@ -14,11 +14,11 @@ pub const DIRECTORY: Module =
 pub const STATE: Module =
     Module { name: "lru_state", source: include_str!("../shader/lib/lru_state.wgsl") };
 
-/// Looking up, touching, requesting, leading, and reading user words; imports [`STATE`].
+/// Looking up, touching, requesting and leading; imports [`STATE`].
 pub const REQUEST: Module =
     Module { name: "lru_request", source: include_str!("../shader/lib/lru_request.wgsl") };
 
-/// Looking up and reading user words only; imports [`DIRECTORY`].
+/// Looking up only; imports [`DIRECTORY`].
 pub const LOOKUP: Module =
     Module { name: "lru_lookup", source: include_str!("../shader/lib/lru_lookup.wgsl") };
 

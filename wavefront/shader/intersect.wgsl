@@ -35,12 +35,6 @@ fn block_take(need: u32) -> bool {
     return true; // pairs come here when all samples are resident
 }
 
-fn block_cell_is_empty(bit: u32) -> bool {
-    return false;
-}
-
-fn block_set_empty(bit: u32) {}
-
 fn block_sample(x: i32, y: i32, z: i32) -> f32 {
     return vertices[x + 5 * y + 25 * z];
 }

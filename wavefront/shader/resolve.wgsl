@@ -14,19 +14,20 @@
 @group(0) @binding(1) var<uniform> shading: ShadingParams;
 @group(0) @binding(2) var<storage, read_write> rays: array<atomic<u32>>;
 #ifdef RESIDENT
-@group(0) @binding(3) var<storage, read_write> cells: array<atomic<u32>>;
+const FIRST_PAGE: u32 = 3u;
 #else
 @group(0) @binding(3) var<storage, read> lru_directory: array<u32>;
+const FIRST_PAGE: u32 = 4u;
 #endif
-@group(0) @binding(4) var<storage, read> lru_slots_0: array<f32>;
+@group(0) @binding(FIRST_PAGE) var<storage, read> lru_slots_0: array<f32>;
 #ifdef LRU_PAGES_2
-@group(0) @binding(5) var<storage, read> lru_slots_1: array<f32>;
+@group(0) @binding(FIRST_PAGE + 1u) var<storage, read> lru_slots_1: array<f32>;
 #endif
 #ifdef LRU_PAGES_3
-@group(0) @binding(6) var<storage, read> lru_slots_2: array<f32>;
+@group(0) @binding(FIRST_PAGE + 2u) var<storage, read> lru_slots_2: array<f32>;
 #endif
 #ifdef LRU_PAGES_4
-@group(0) @binding(7) var<storage, read> lru_slots_3: array<f32>;
+@group(0) @binding(FIRST_PAGE + 3u) var<storage, read> lru_slots_3: array<f32>;
 #endif
 @group(0) @binding(COLOR_BINDING) var color_out: texture_storage_2d<rgba8unorm, write>;
 #ifdef OUTPUT_DEPTH
@@ -52,8 +53,6 @@ fn lru_slots_per_page() -> u32 {
 #ifdef RESIDENT
 #else
 fn block_use(slot: u32) {}
-
-fn block_set_empty(bit: u32) {}
 #endif
 
 // Finds the hit again: the first crossing in the block, whose samples are still resident.

@@ -42,11 +42,6 @@ fn block_use(slot: u32) {
     lru_touch(slot);
 }
 
-fn block_set_empty(bit: u32) {
-    let word = lru_user_index(block_slots[0], bit >> 5u);
-    atomicAnd(&lru_directory[word], ~(1u << (bit & 31u)));
-}
-
 // Keeps or requests the needed samples of the opened block. The oldest active ray leads: it is served
 // whatever the others ask for.
 fn request(need: u32, leads: bool) {

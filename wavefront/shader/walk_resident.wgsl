@@ -9,16 +9,15 @@
 @group(0) @binding(0) var<uniform> frame: FrameParams;
 @group(0) @binding(1) var<storage, read_write> rays: array<u32>;
 @group(0) @binding(2) var<storage, read> masks: array<vec2<u32>>;
-@group(0) @binding(3) var<storage, read_write> cells: array<atomic<u32>>;
-@group(0) @binding(4) var<storage, read> lru_slots_0: array<f32>;
+@group(0) @binding(3) var<storage, read> lru_slots_0: array<f32>;
 #ifdef LRU_PAGES_2
-@group(0) @binding(5) var<storage, read> lru_slots_1: array<f32>;
+@group(0) @binding(4) var<storage, read> lru_slots_1: array<f32>;
 #endif
 #ifdef LRU_PAGES_3
-@group(0) @binding(6) var<storage, read> lru_slots_2: array<f32>;
+@group(0) @binding(5) var<storage, read> lru_slots_2: array<f32>;
 #endif
 #ifdef LRU_PAGES_4
-@group(0) @binding(7) var<storage, read> lru_slots_3: array<f32>;
+@group(0) @binding(6) var<storage, read> lru_slots_3: array<f32>;
 #endif
 
 fn lru_slots_per_page() -> u32 {

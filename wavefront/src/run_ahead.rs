@@ -39,8 +39,8 @@ impl RunAhead {
 
     /// Text and bindings of the kernel.
     pub fn source(samples: SampleLayout) -> KernelSource {
-        // The directory and the cache's state, or what is known of the cells.
-        let (module, tables) = if samples.resident { (WALK_RESIDENT, 1) } else { (WALK, 2) };
+        // The directory and the cache's state.
+        let (module, tables) = if samples.resident { (WALK_RESIDENT, 0) } else { (WALK, 2) };
         let mut bindings = vec![FRAME_PARAMS, RAYS, MASKS];
         bindings.extend(vec![WRITE; tables]);
         bindings.extend(vec![SLOTS; samples.pages as usize]);
@@ -57,11 +57,8 @@ impl Strategy for RunAhead {
     ) -> Result<Box<dyn Rounds>, Error> {
         let Scene { rays, masks, samples } = scene;
         let mut bindings = resources(&[rays.frame(), rays.rays(), masks]);
-        match samples {
-            Samples::Cached(cache) => {
-                bindings.extend(resources(&[cache.directory(), cache.state()]));
-            }
-            Samples::Resident(resident) => bindings.extend(resources(&[resident.cells()])),
+        if let Samples::Cached(cache) = samples {
+            bindings.extend(resources(&[cache.directory(), cache.state()]));
         }
         bindings.extend(samples.slots().iter().map(|page| page.as_entire_binding()));
         let bind = self.walk.bind(device, "wavefront.walk", &bindings);

@@ -6,7 +6,7 @@ use gpu_primitives::wgpu;
 use gpu_primitives::wgsl::Module;
 use lru_cache_gpu::{CacheBuffers, ResidentBuffers};
 
-use crate::rays::{READ, SLOTS, WRITE};
+use crate::rays::{READ, SLOTS};
 
 const CACHED: Module =
     Module { name: "block_samples", source: include_str!("../shader/lib/block_slots.wgsl") };
@@ -49,7 +49,7 @@ impl SampleLayout {
 
     /// Bindings of a kernel that only reads samples: [`Samples::resources`].
     pub(crate) fn bindings(self) -> Vec<Binding> {
-        let mut bindings = vec![if self.resident { WRITE } else { READ }];
+        let mut bindings = if self.resident { Vec::new() } else { vec![READ] };
         bindings.extend(vec![SLOTS; self.pages as usize]);
         bindings
     }
@@ -64,13 +64,13 @@ impl<'a> Samples<'a> {
         }
     }
 
-    /// The directory, or what is known of the cells, and the slots.
+    /// The directory, if there is one, and the slots.
     pub(crate) fn resources(self) -> Vec<wgpu::BindingResource<'a>> {
-        let first = match self {
-            Samples::Cached(cache) => cache.directory(),
-            Samples::Resident(resident) => resident.cells(),
+        let directory = match self {
+            Samples::Cached(cache) => Some(cache.directory().as_entire_binding()),
+            Samples::Resident(_) => None,
         };
         let slots = self.slots().iter().map(|page| page.as_entire_binding());
-        std::iter::once(first.as_entire_binding()).chain(slots).collect()
+        directory.into_iter().chain(slots).collect()
     }
 }

@@ -1,5 +1,5 @@
 // Layout of the directory, a hash table with a chain of slots for every head: first the heads, then
-// four words for each slot. A link is 0 at a chain's end, otherwise a slot + 1; a head is the first
+// two words for each slot. A link is 0 at a chain's end, otherwise a slot + 1; a head is the first
 // link of its chain. The importing text declares
 //   fn lru_params() -> LruParams
 #import lru_params
@@ -7,11 +7,7 @@
 // Words of a slot's entry.
 const LRU_BLOCK: u32 = 0u; // block + 1; 0 for a slot without a block
 const LRU_NEXT: u32 = 1u;  // link to the next slot of the chain
-const LRU_USER: u32 = 2u;  // two words that belong to the cache's user
-const LRU_ENTRY_WORDS: u32 = 4u;
-
-// User words of a slot that was just given to a block.
-const LRU_NO_USER: u32 = 0xffffffffu;
+const LRU_ENTRY_WORDS: u32 = 2u;
 
 // MurmurHash3's finalizer: blocks that are neighbours on any axis fall anywhere.
 fn lru_hash(block: u32) -> u32 {
@@ -31,9 +27,4 @@ fn lru_head_index(block: u32) -> u32 {
 // Index of the first word of a slot's entry.
 fn lru_entry_index(slot: u32) -> u32 {
     return lru_params().heads + LRU_ENTRY_WORDS * slot;
-}
-
-// Index of user word i, 0 or 1, of a slot: for kernels that change it.
-fn lru_user_index(slot: u32, i: u32) -> u32 {
-    return lru_entry_index(slot) + LRU_USER + i;
 }

@@ -15,8 +15,3 @@ fn lru_lookup(block: u32) -> u32 {
     }
     return LRU_MISSING;
 }
-
-// User word i, 0 or 1, of a slot.
-fn lru_user_word(slot: u32, i: u32) -> u32 {
-    return lru_directory[lru_user_index(slot, i)];
-}

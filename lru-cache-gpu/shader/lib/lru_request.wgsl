@@ -14,11 +14,6 @@ fn lru_lookup(block: u32) -> u32 {
     return LRU_MISSING;
 }
 
-// User word i, 0 or 1, of a slot.
-fn lru_user_word(slot: u32, i: u32) -> u32 {
-    return atomicLoad(&lru_directory[lru_user_index(slot, i)]);
-}
-
 // Keeps the slot for the rest of this round and marks it as used, which counts once per round.
 fn lru_touch(slot: u32) {
     let clock = atomicLoad(&lru_state[LRU_CLOCK]);

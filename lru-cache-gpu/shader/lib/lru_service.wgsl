@@ -79,8 +79,6 @@ fn lru_without_victims(first: u32) -> u32 {
 fn lru_insert(block: u32, slot: u32, stamp: u32) {
     let entry = lru_entry_index(slot);
     atomicStore(&lru_directory[entry + LRU_BLOCK], block + 1u);
-    atomicStore(&lru_directory[entry + LRU_USER], LRU_NO_USER);
-    atomicStore(&lru_directory[entry + LRU_USER + 1u], LRU_NO_USER);
     atomicStore(&lru_state[lru_stamp_word(slot)], stamp);
     let first = atomicExchange(&lru_directory[lru_head_index(block)], slot + 1u);
     atomicStore(&lru_directory[entry + LRU_NEXT], first & ~LRU_UNLINKING);

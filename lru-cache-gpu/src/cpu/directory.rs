@@ -5,8 +5,6 @@ use std::iter::successors;
 use super::Cache;
 use crate::layout::*;
 
-const NO_USER: u32 = u32::MAX;
-
 /// The finalizer of `MurmurHash3`.
 pub(super) fn hash(block: u32) -> u32 {
     let mut h = block;
@@ -28,12 +26,6 @@ impl Cache {
         self.directory[self.entry(slot) + BLOCK].checked_sub(1)
     }
 
-    /// User words of a slot.
-    pub fn user_words(&self, slot: u32) -> [u32; 2] {
-        let first = self.entry(slot) + USER;
-        [self.directory[first], self.directory[first + 1]]
-    }
-
     /// Slots in a block's chain; endless if the chain is a cycle.
     pub fn chain(&self, block: u32) -> impl Iterator<Item = u32> {
         let slot = |word: usize| self.directory[word].checked_sub(1);
@@ -45,23 +37,11 @@ impl Cache {
         self.insert_at(block, slot, self.clock());
     }
 
-    /// Forgets what the cache's user keeps with the blocks.
-    pub fn reset_user_words(&mut self) {
-        for slot in 0..self.params.slots {
-            let first = self.entry(slot) + USER;
-            self.directory[first..first + 2].fill(NO_USER);
-        }
-    }
-
     pub(super) fn insert_at(&mut self, block: u32, slot: u32, stamp: u32) {
         let (entry, head) = (self.entry(slot), self.head(block));
         let first = std::mem::replace(&mut self.directory[head], slot + 1);
-        self.directory[entry..entry + ENTRY_WORDS].copy_from_slice(&[
-            block + 1,
-            first,
-            NO_USER,
-            NO_USER,
-        ]);
+        self.directory[entry + BLOCK] = block + 1;
+        self.directory[entry + NEXT] = first;
         let word = self.stamp_word(slot);
         self.state[word] = stamp;
     }

@@ -211,16 +211,6 @@ impl OnGpu {
         copy
     }
 
-    /// Overwrites the directory.
-    pub(crate) fn write_directory(&self, words: &[u32]) {
-        let gpu = gpu();
-        let usage = wgpu::BufferUsages::COPY_SRC;
-        let words = gpu::buffer_with(&gpu.device, bytemuck::cast_slice(words), usage);
-        let mut encoder = gpu.encoder();
-        encoder.copy_buffer_to_buffer(&words, 0, self.buffers.directory(), 0, words.size());
-        gpu.submit(encoder);
-    }
-
     /// Plays the uses, in order or in parallel; the slots that they found.
     pub(crate) fn play(&self, round: &Round, in_order: bool) -> Vec<Option<u32>> {
         let gpu = gpu();
@@ -363,7 +353,7 @@ pub(crate) fn difference(a: &Cache, b: &Cache) -> Option<(&'static str, usize, u
 }
 
 #[track_caller]
-pub(crate) fn assert_same(gpu: &Cache, twin: &Cache, when: &str) {
+fn assert_same(gpu: &Cache, twin: &Cache, when: &str) {
     assert_eq!(difference(gpu, twin), None, "{when}: array, word, GPU, twin");
 }
 

@@ -4,7 +4,7 @@
 use lru_cache_gpu::cpu::Cache;
 use lru_cache_gpu::wgpu::Limits;
 
-use crate::harness::{Lockstep, Op, Round, assert_same, gpu, plan, sorted};
+use crate::harness::{Lockstep, Op, Round, gpu, plan, sorted};
 
 fn cache(blocks: u64, slots: u64) -> Lockstep {
     Lockstep::new(&plan(blocks, slots, &Limits::default()))
@@ -94,34 +94,6 @@ fn a_cleared_cache_begins_anew() {
     cache.twin.begin_frame();
     let served = cache.round(&Round::uses(40..50));
     assert_eq!(sorted(served.jobs.iter().map(|job| job[1]).collect()), list(0..10));
-}
-
-#[test]
-fn user_words_are_forgotten_when_told_and_when_a_block_comes_in() {
-    let mut cache = cache(100, 70);
-    cache.round(&Round::uses(0..60));
-    let words = |cache: &Cache| -> Vec<_> { (0..70).map(|s| cache.user_words(s)).collect() };
-    let fresh: Vec<_> = words(&cache.twin).into_iter().take(60).collect();
-    assert_eq!(fresh, [[u32::MAX; 2]; 60]);
-    // The user keeps something with every block.
-    let first = cache.twin.directory.len() - 4 * 70;
-    for entry in cache.twin.directory[first..].chunks_exact_mut(4).take(60) {
-        let owner = entry[0];
-        entry[2..].fill(owner);
-    }
-    cache.gpu.write_directory(&cache.twin.directory);
-    cache.round(&Round::uses(50..65).in_new_frame());
-    for (slot, user) in (0..70).zip(words(&cache.twin)) {
-        let block = cache.twin.owner(slot);
-        let expected = block.map_or(0, |b| if b < 60 { b + 1 } else { u32::MAX });
-        assert_eq!(user, [expected; 2], "slot {slot} of {block:?}");
-    }
-    let mut encoder = gpu().encoder();
-    gpu().service.record_reset_user_words(&mut encoder, &cache.gpu.buffers);
-    gpu().submit(encoder);
-    cache.twin.reset_user_words();
-    assert_same(&cache.gpu.read(&cache.twin), &cache.twin, "after the reset");
-    assert_eq!(words(&cache.twin), [[u32::MAX; 2]; 70]);
 }
 
 #[test]

@@ -49,7 +49,6 @@ fn lookup_alone_needs_only_a_read_only_directory() {
         fn lru_params() -> LruParams { return params; }
         @compute @workgroup_size(1) fn main() {
             out[0] = lru_lookup(out[1]);
-            out[1] = lru_user_word(out[0], 1u);
         }";
     let entry = Module { name: "lookup", source: TEXT };
     let text = compose(entry, &wgsl::MODULES, &[]).unwrap().source;

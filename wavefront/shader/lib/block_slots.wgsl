@@ -1,9 +1,7 @@
 // Samples of a block and its plus-side neighbours straight from their slots, looked up when first
-// needed. Needs lru_lookup, lru_user_word and lru_sample; the importing text declares
+// needed. Needs lru_lookup and lru_sample; the importing text declares
 //   var<uniform> frame: FrameParams;
-// and fn block_use(slot: u32), which is told of every slot looked up, and fn block_set_empty(bit: u32).
-// The user words of a slot have a bit for each of the block's cells; it is 0 once a ray has found that
-// cell on one side of the surface.
+// and fn block_use(slot: u32), which is told of every slot looked up.
 #import frame
 #import lru_slots
 
@@ -11,23 +9,10 @@ var<private> block_position: vec3<i32>;
 // Slots of the block (0) and of its plus-side neighbours x + 2y + 4z, and which of them are known.
 var<private> block_slots: array<u32, 8>;
 var<private> block_known: u32;
-var<private> block_cells: vec2<u32>;
 
 fn block_open(position: vec3<i32>) {
     block_position = position;
     block_known = 0u;
-    block_cells = vec2<u32>(0xffffffffu);
-    let slot = lru_lookup(block_neighbour(0u));
-    if (slot != LRU_MISSING) {
-        block_use(slot);
-        block_slots[0] = slot;
-        block_known = 1u;
-        block_cells = vec2<u32>(lru_user_word(slot, 0u), lru_user_word(slot, 1u));
-    }
-}
-
-fn block_cell_is_empty(bit: u32) -> bool {
-    return ((select(block_cells.x, block_cells.y, bit >= 32u) >> (bit & 31u)) & 1u) == 0u;
 }
 
 // Number of neighbour i of the block.

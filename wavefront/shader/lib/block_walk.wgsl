@@ -1,9 +1,7 @@
 // A ray's way through the dual cells of one block. The importing text supplies
 // fn block_take(need: u32) -> bool, whether the samples of the needed blocks are at hand (bit 0 the
-// block itself, bit n its plus-side neighbour n = x + 2y + 4z),
-// fn block_sample(x: i32, y: i32, z: i32) -> f32, the sample at 0 ..= 4 on each axis from the block's first,
-// fn block_cell_is_empty(bit: u32) -> bool, whether the block's cell x + 4y + 16z is known to lie on one
-// side of the surface, and fn block_set_empty(bit: u32), which may remember that.
+// block itself, bit n its plus-side neighbour n = x + 2y + 4z)
+// and fn block_sample(x: i32, y: i32, z: i32) -> f32, the sample at 0 ..= 4 on each axis from the block's first.
 #import cell
 
 // Where a ray stands inside a block: `cell` was reached by `event`.
@@ -33,20 +31,12 @@ fn block_cell_need(cell: vec3<i32>) -> u32 {
     return need;
 }
 
-// Number of a cell in its block: x + 4y + 16z.
-fn block_cell_bit(cell: vec3<i32>) -> u32 {
-    return u32((cell.x & 3) | ((cell.y & 3) << 2u) | ((cell.z & 3) << 4u));
-}
-
-// Blocks that the samples lie in of all cells that the ray visits in `box` from `start` on and that are not
-// known to be empty.
+// Blocks that the samples lie in of all cells that the ray visits in `box` from `start` on.
 fn block_need(ray: DdaRay, start: vec3<i32>, box: DdaBox) -> u32 {
     var need = 0u;
     var cell = start;
     while (all(cell >= box.low) && all(cell <= box.high)) {
-        if (!block_cell_is_empty(block_cell_bit(cell))) {
-            need |= block_cell_need(cell);
-        }
+        need |= block_cell_need(cell);
         cell = block_next(ray, cell, dda_cell_exit(ray, cell));
     }
     return need;
@@ -75,30 +65,25 @@ fn block_walk(ray: DdaRay, start: CellPlace, box: DdaBox, isovalue: f32) -> Bloc
     walk.place = start;
     while (all(walk.place.cell >= box.low) && all(walk.place.cell <= box.high)) {
         let cell = walk.place.cell;
-        let bit = block_cell_bit(cell);
         walk.exit = dda_cell_exit(ray, cell);
-        if (!block_cell_is_empty(bit)) {
-            if (!block_take(block_cell_need(cell))) {
-                walk.missing = true;
+        if (!block_take(block_cell_need(cell))) {
+            walk.missing = true;
+            return walk;
+        }
+        walk.corners = block_corners(cell, isovalue);
+        if (!cell_on_one_side(walk.corners)) {
+            walk.bernstein = cell_bernstein(
+                walk.corners,
+                cell_entry(ray, walk.place.event, cell),
+                cell_exit(ray, walk.exit, cell),
+            );
+            // The neighbours compute these sides from the same four samples in the same way.
+            walk.inside_low = walk.bernstein.x >= 0.0;
+            walk.bracket = cell_first_crossing(
+                walk.bernstein, walk.inside_low, walk.bernstein.w >= 0.0);
+            if (walk.bracket.found) {
+                walk.hit = true;
                 return walk;
-            }
-            walk.corners = block_corners(cell, isovalue);
-            if (cell_on_one_side(walk.corners)) {
-                block_set_empty(bit);
-            } else {
-                walk.bernstein = cell_bernstein(
-                    walk.corners,
-                    cell_entry(ray, walk.place.event, cell),
-                    cell_exit(ray, walk.exit, cell),
-                );
-                // The neighbours compute these sides from the same four samples in the same way.
-                walk.inside_low = walk.bernstein.x >= 0.0;
-                walk.bracket = cell_first_crossing(
-                    walk.bernstein, walk.inside_low, walk.bernstein.w >= 0.0);
-                if (walk.bracket.found) {
-                    walk.hit = true;
-                    return walk;
-                }
             }
         }
         walk.place = CellPlace(walk.exit, block_next(ray, cell, walk.exit));
