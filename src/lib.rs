@@ -8,6 +8,7 @@ mod plan;
 mod renderer;
 mod report;
 mod samples;
+mod schedule;
 mod stages;
 mod timing;
 mod volume;

@@ -87,16 +87,21 @@ pub struct Frame {
 pub struct FrameOptions {
     /// Colours and light.
     pub shading: Shading,
-    /// Rounds of walk, request and decode per pass, at least 1. More rounds per pass mean fewer
-    /// submissions and longer ones.
+    /// Most rounds of walk, request and decode in a pass, at least 1. Those that come after the frame is
+    /// complete cost next to nothing.
     pub rounds_per_pass: u32,
-    /// `RunAhead`: active blocks that a stopped ray requests, the missing one included; at least 1, which means
-    /// no look-ahead. More need fewer passes and decode more.
+    /// GPU time in milliseconds that a pass should not exceed, so that no driver's watchdog fires and the
+    /// caller's own work gets its turn: by what rounds took so far, a pass has as many as fit, but never less
+    /// than one. Infinity: always `rounds_per_pass`.
+    pub pass_ms: f32,
+    /// `RunAhead`: active blocks that a stopped ray requests, the missing one included. It doubles with every
+    /// round in which the ray stops again, up to 64, and is larger from the start where the cache holds the last
+    /// frame's blocks. 1 means no look-ahead at all. More need fewer passes and decode more.
     pub look_ahead: u32,
 }
 
 impl Default for FrameOptions {
     fn default() -> Self {
-        Self { shading: Shading::default(), rounds_per_pass: 1, look_ahead: 1 }
+        Self { shading: Shading::default(), rounds_per_pass: 8, pass_ms: 30.0, look_ahead: 2 }
     }
 }

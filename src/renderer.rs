@@ -6,7 +6,7 @@ use gpu_primitives::memory::{Category, Ledger};
 use gpu_primitives::readback::ReadbackRing;
 use gpu_primitives::upload::UploadRing;
 use macrocell::{Masks, RangeBuffers};
-use wavefront::{FrameView, OutputTextures, ShadingParams, Statistics};
+use wavefront::{FrameView, LookAhead, OutputTextures, ShadingParams, Statistics};
 use web_time::Instant;
 use zfp_gpu::Payload;
 
@@ -14,6 +14,7 @@ use crate::capture::PendingCapture;
 use crate::load::Loader;
 use crate::plan::{PARAMS_CHUNK, PASSES_IN_FLIGHT};
 use crate::samples::SampleBuffers;
+use crate::schedule::Schedule;
 use crate::stages::{Picture, Stages};
 use crate::timing::Timer;
 use crate::{
@@ -22,6 +23,10 @@ use crate::{
 
 /// Largest size of an isovalue or a sample.
 const LARGEST_VALUE: f32 = 2.126_764_8e37; // 2^124
+
+/// Rounds that count as missed when a frame starts with the last one's blocks in the cache: few are missing
+/// then, and those few are worth finding in two rounds.
+const WARM_MISSES: u32 = 3;
 
 /// What is read back after a pass.
 #[repr(C)]
@@ -78,6 +83,8 @@ pub struct ProgressiveIsoRenderer {
     active_isovalue: Option<f32>,
     clear_cache: bool,
     submitted: Vec<Submitted>,
+    schedule: Schedule,
+    last_report_at: Instant,
     report: PassReport,
 }
 
@@ -99,6 +106,7 @@ struct Submitted {
     pass: u32,
     rounds: u32,
     dispatches: u32,
+    begin: Instant,
     cpu_ms: f64,
     /// Bytes of the pass's [`PassRecord`] in what is read back.
     record_bytes: usize,
@@ -168,6 +176,8 @@ impl ProgressiveIsoRenderer {
             active_isovalue: None,
             clear_cache: false,
             submitted: Vec::new(),
+            schedule: Schedule::default(),
+            last_report_at: Instant::now(),
             report: PassReport::default(),
         })
     }
@@ -295,7 +305,8 @@ impl ProgressiveIsoRenderer {
             state.started = true;
         }
         state.passes += 1;
-        for _ in 0..state.frame.options.rounds_per_pass.max(1) {
+        let options = &state.frame.options;
+        for _ in 0..self.schedule.rounds(options.rounds_per_pass, options.pass_ms) {
             state.rounds += 1;
             let _span =
                 tracing::debug_span!("progressive_iso.round", round = state.rounds).entered();
@@ -318,6 +329,7 @@ impl ProgressiveIsoRenderer {
         let (stages, frame) = (&self.stages, &state.frame);
         let isovalue = frame.isovalues[0];
         let clear = std::mem::take(&mut self.clear_cache);
+        let warm = !clear && self.active_isovalue == Some(isovalue);
         self.samples.record_begin_frame(encoder, &stages.samples, clear);
         if self.active_isovalue != Some(isovalue) {
             let (ranges, masks) = (&self.ranges, &self.masks);
@@ -326,7 +338,11 @@ impl ProgressiveIsoRenderer {
         }
         let grid = self.plan.macrocell.grid();
         let lru = self.plan.samples.params();
-        let params = state.view.params(grid, lru, isovalue, frame.options.look_ahead);
+        let look_ahead = LookAhead {
+            blocks: frame.options.look_ahead,
+            first_misses: if warm { WARM_MISSES } else { 0 },
+        };
+        let params = state.view.params(grid, lru, isovalue, look_ahead);
         let shading = ShadingParams::new(&frame.options.shading, self.volume.world_from_index);
         let Picture { rays, rounds, .. } = &self.picture;
         stages.rays.record_start(device, encoder, &mut self.upload, rays, &params, &shading);
@@ -361,7 +377,7 @@ impl ProgressiveIsoRenderer {
             };
             let cpu_ms = begin.elapsed().as_secs_f64() * 1e3;
             let submitted =
-                Submitted { tag, frame, pass, rounds, dispatches, cpu_ms, record_bytes };
+                Submitted { tag, frame, pass, rounds, dispatches, begin, cpu_ms, record_bytes };
             self.submitted.push(submitted);
         }
     }
@@ -389,6 +405,7 @@ impl ProgressiveIsoRenderer {
             return;
         }
         self.loader = None;
+        self.take_time(submitted, record);
         let since = |now: u32, before: u32| now.wrapping_sub(before);
         let report = &mut self.report;
         report.loaded = 1.0;
@@ -409,6 +426,18 @@ impl ProgressiveIsoRenderer {
         report.ray_block_pairs = record.statistics.pairs;
         report.visible_blocks = record.statistics.visible_blocks;
         report.blocks_evicted = since(record.cache.evicted, record.cache_before.evicted);
+    }
+
+    /// What a pass took, by the GPU's clock or, without one, from its recording or the report before on.
+    fn take_time(&mut self, submitted: Submitted, record: &PassRecord) {
+        let now = Instant::now();
+        let elapsed = now.duration_since(submitted.begin.max(self.last_report_at));
+        self.last_report_at = now;
+        let gpu_ms = self.timer.milliseconds(record.ticks);
+        let ms = gpu_ms.unwrap_or(1e3 * elapsed.as_secs_f64());
+        let same_frame = self.report.frame == submitted.frame;
+        let rounds_before = if same_frame { self.report.rounds } else { 0 };
+        self.schedule.take(submitted.rounds.saturating_sub(rounds_before), ms);
     }
 
     fn report(&self, submitted: bool) -> PassReport {

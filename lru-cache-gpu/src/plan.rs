@@ -52,6 +52,11 @@ pub struct CachePlan {
     slots_per_page: u64,
 }
 
+/// Slots of a full page: a power of two, so that kernels find a slot's page by a shift.
+pub(crate) fn slots_of_a_page(binding: u64) -> u64 {
+    1 << (binding / SLOT_BYTES).max(1).ilog2()
+}
+
 impl CachePlan {
     /// The largest cache for a volume of `blocks` blocks that takes at most `bytes`, and never
     /// more slots than there are blocks.
@@ -80,7 +85,7 @@ impl CachePlan {
             return Err(Error::TooManyBlocks { blocks, most: most_blocks });
         }
         let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        let slots_per_page = (binding / SLOT_BYTES).max(1);
+        let slots_per_page = slots_of_a_page(binding);
         let most = blocks.min(slots_per_page * most_pages.clamp(1, MAX_PAGES)).min(MAX_SLOTS);
         let with = |slots| Self { blocks, slots, slots_per_page };
         let needed = |slots| with(slots).bytes() + beside(slots);

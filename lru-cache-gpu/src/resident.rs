@@ -5,7 +5,7 @@ use gpu_primitives::memory::{Buffer, Category, Ledger};
 use gpu_primitives::wgpu;
 
 use crate::Error;
-use crate::plan::{LruParams, SLOT_BYTES};
+use crate::plan::{LruParams, SLOT_BYTES, slots_of_a_page};
 
 /// Sizes of a volume that is resident as a whole: block b in slot b.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -21,7 +21,7 @@ impl ResidentPlan {
     /// [`Error::TooManyBlocks`] if the pages do not hold them.
     pub fn new(blocks: u64, limits: &wgpu::Limits, most_pages: u64) -> Result<Self, Error> {
         let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        let slots_per_page = (binding / SLOT_BYTES).max(1);
+        let slots_per_page = slots_of_a_page(binding);
         let most = slots_per_page * most_pages;
         if blocks > most {
             return Err(Error::TooManyBlocks { blocks, most });

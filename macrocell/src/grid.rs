@@ -87,6 +87,13 @@ impl Grid {
         self.coarse_count() >= THIRD_LEVEL_FROM
     }
 
+    /// Bits of a block's x, of its x and y, and of its whole position when the three coordinates are packed
+    /// into one number.
+    pub fn packing(&self) -> [u32; 3] {
+        let [x, y, z] = self.blocks().map(|n| n.max(1).next_power_of_two().ilog2());
+        [x, x + y, x + y + z]
+    }
+
     /// Last dual cell on each axis, `dims - 2`; -1 where an axis has no dual cells.
     pub fn last_cell(&self) -> [i32; 3] {
         self.dims.map(|d| d as i32 - 2)

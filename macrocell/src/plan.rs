@@ -14,8 +14,8 @@ const EXTREMA_BYTES: u64 = 64;
 /// Bytes of a coarse cell's range codes.
 pub(crate) const CODE_BYTES: u64 = 128;
 
-/// Most blocks, so that an index leaves five bits for a ray's status and its misses.
-const MAX_BLOCKS: u64 = 1 << 27;
+/// Most bits of a block's packed position, so that two are left for a ray's status.
+const MOST_BITS: u32 = 30;
 
 /// Sizes of everything this crate allocates for one volume.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -55,8 +55,9 @@ impl MacrocellPlan {
             return Err(Error::EmptyVolume { dims });
         }
         let grid = Grid::new(dims);
-        if grid.block_count() > MAX_BLOCKS {
-            let (blocks, limit) = (grid.block_count(), MAX_BLOCKS);
+        let [.., bits] = grid.packing();
+        if bits > MOST_BITS {
+            let (blocks, limit) = (grid.block_count(), 1 << MOST_BITS);
             return Err(Error::TooManyBlocks { dims, blocks, limit });
         }
         let available = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);

@@ -30,7 +30,7 @@ fn advance(grid: MacrocellGrid, ray: DdaRay, first_block: vec3<i32>, first_pair:
     if (!macrocell_inside(grid, place.block)) {
         return RAY_DONE;
     }
-    return RAY_ACTIVE | macrocell_linear(place.block, grid.blocks);
+    return RAY_ACTIVE | frame_pack(frame, place.block);
 }
 
 @compute @workgroup_size(64)
@@ -45,7 +45,7 @@ fn main(
     }
     let id = rays[frame_list_word(frame, index)];
     let ray = frame_ray(frame, frame_pixel(frame, id)).ray;
-    let block = frame_block_position(frame, rays[RAYS_HEADER + id] & RAY_BLOCK);
+    let block = frame_unpack(frame, rays[RAYS_HEADER + id]);
 #ifdef EMPTY_SPACE_STEP
     rays[RAYS_HEADER + id] = advance(frame_grid(frame, id), ray, block, 0u, 0u);
 #else

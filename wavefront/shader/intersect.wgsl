@@ -57,7 +57,7 @@ fn intersect(pair: u32, position: vec3<i32>) {
     let box = macrocell_box(frame.grid, position);
     let entry = dda_entry(ray, box);
     let start = CellPlace(entry, dda_cell_after(ray, entry, box, dda_first_cells(ray, box)));
-    if (block_walk(ray, start, box, frame.isovalue).hit) {
+    if (block_walk(ray, start, box, frame.isovalue, 0u).hit) {
         let block = pairs[PAIRS_HEADER + pair] & PAIR_BLOCK;
         pairs[PAIRS_HEADER + pair] = PAIR_HIT | block;
     }

@@ -56,18 +56,18 @@ fn block_use(slot: u32) {}
 #endif
 
 // Finds the hit again: the first crossing in the block, whose samples are still resident.
-fn hit_in_block(ray: DdaRay, block: vec3<i32>) -> BlockWalk {
+fn hit_in_block(ray: DdaRay, block: vec3<i32>, known: u32) -> BlockWalk {
     block_open(block);
     let place = macrocell_enter(frame.grid, ray, block);
     let start = CellPlace(place.event, macrocell_first_cell(frame.grid, ray, place));
-    return block_walk(ray, start, macrocell_box(frame.grid, block), frame.isovalue);
+    return block_walk(ray, start, macrocell_box(frame.grid, block), frame.isovalue, known);
 }
 
-fn resolve(id: u32, block: u32) {
+fn resolve(id: u32, state: u32) {
     let pixel = frame_pixel(frame, id);
     let frame_ray = frame_ray(frame, pixel);
     let ray = frame_ray.ray;
-    let walk = hit_in_block(ray, frame_block_position(frame, block));
+    let walk = hit_in_block(ray, frame_unpack(frame, state), frame_count(frame, state));
     let s = cell_root(walk.bernstein, walk.bracket, walk.inside_low);
     let t = cell_mix(walk.place.event.t, walk.exit.t, s);
     let low = cell_entry(ray, walk.place.event, walk.place.cell);
@@ -100,7 +100,7 @@ fn main(
             atomicAnd(&rays[frame_active_word(frame, id)], ~(1u << (id & 31u)));
         }
         if (status == RAY_HIT) {
-            resolve(id, state & RAY_BLOCK);
+            resolve(id, state);
             atomicStore(&rays[RAYS_HEADER + id], RAY_DONE | RAY_HIT);
             atomicAdd(&hit_count, 1u);
         } else if (status == RAY_DONE) {

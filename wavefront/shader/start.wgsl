@@ -26,7 +26,7 @@ fn first_state(grid: MacrocellGrid, ray: DdaRay) -> u32 {
         return RAY_DONE;
     }
     let cell = dda_cell_after(ray, dda_entry(ray, volume), volume, dda_first_cells(ray, volume));
-    return RAY_ACTIVE | macrocell_linear(cell >> vec3<u32>(2u), grid.blocks);
+    return RAY_ACTIVE | frame_pack_count(frame, frame.first_misses) | frame_pack(frame, cell >> vec3<u32>(2u));
 }
 
 @compute @workgroup_size(64)

@@ -39,7 +39,7 @@ fn macrocell_mask(index: u32) -> vec2<u32> {
 }
 
 fn block_use(slot: u32) {
-    lru_touch(slot);
+    lru_keep(slot);
 }
 
 // Keeps or requests the needed samples of the opened block. The oldest active ray leads: it is served
@@ -50,7 +50,7 @@ fn request(need: u32, leads: bool) {
         let block = block_neighbour(countTrailingZeros(rest));
         let slot = lru_lookup(block);
         if (slot != LRU_MISSING) {
-            lru_touch(slot);
+            lru_keep(slot);
         } else if (!leads) {
             lru_request(block);
         }
@@ -90,23 +90,21 @@ fn look_ahead(misses: u32, most: u32) -> u32 {
 
 // The ray's new state.
 fn walk(grid: MacrocellGrid, ray: DdaRay, state: u32, most: u32, leads: bool) -> u32 {
-    let first = frame_block_position(frame, state & RAY_BLOCK);
+    let first = frame_unpack(frame, state);
     var place = macrocell_advance(grid, ray, macrocell_enter(grid, ray, first));
     while (macrocell_inside(grid, place.block)) {
-        let block = macrocell_linear(place.block, grid.blocks);
         block_open(place.block);
         let box = macrocell_box(grid, place.block);
         let start = CellPlace(place.event, macrocell_first_cell(grid, ray, place));
-        let result = block_walk(ray, start, box, frame.isovalue);
+        let result = block_walk(ray, start, box, frame.isovalue, 0u);
         if (result.hit) {
-            return RAY_HIT | block;
+            return RAY_HIT | frame_pack_count(frame, result.cells) | frame_pack(frame, place.block);
         }
         if (result.missing) {
-            let before = (state >> RAY_MISSES_SHIFT) & RAY_MOST_MISSES;
-            let went_on = block != (state & RAY_BLOCK);
-            let misses = min(before + u32(went_on), RAY_MOST_MISSES);
+            let before = frame_count(frame, state);
+            let misses = min(before + u32(any(place.block != first)), RAY_MOST_MISSES);
             request_ahead(grid, ray, place, look_ahead(before, most), leads);
-            return RAY_ACTIVE | (misses << RAY_MISSES_SHIFT) | block;
+            return RAY_ACTIVE | frame_pack_count(frame, misses) | frame_pack(frame, place.block);
         }
         place = macrocell_advance(
             grid, ray, macrocell_step(ray, place.block, result.place.event));

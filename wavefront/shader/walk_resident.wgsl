@@ -36,7 +36,7 @@ fn walk(grid: MacrocellGrid, ray: DdaRay, first_block: vec3<i32>) -> u32 {
         block_open(place.block);
         let box = macrocell_box(grid, place.block);
         let start = CellPlace(place.event, macrocell_first_cell(grid, ray, place));
-        let result = block_walk(ray, start, box, frame.isovalue);
+        let result = block_walk(ray, start, box, frame.isovalue, 0u);
         if (result.hit) {
             return RAY_HIT | macrocell_linear(place.block, frame.grid.blocks);
         }
@@ -58,6 +58,6 @@ fn main(
     }
     let id = rays[frame_list_word(frame, index)];
     let ray = frame_ray(frame, frame_pixel(frame, id)).ray;
-    let block = frame_block_position(frame, rays[RAYS_HEADER + id] & RAY_BLOCK);
+    let block = frame_unpack(frame, rays[RAYS_HEADER + id]);
     rays[RAYS_HEADER + id] = walk(frame_grid(frame, id), ray, block);
 }

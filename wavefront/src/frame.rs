@@ -58,9 +58,27 @@ pub struct FrameParams {
     pub(crate) ray_level: u32,
     pub(crate) ray_columns: u32,
     pub(crate) list_capacity: u32,
+    pub(crate) first_misses: u32,
+    pub(crate) shift_y: u32,
+    pub(crate) shift_z: u32,
+    pub(crate) shift_misses: u32,
     pub(crate) pad0: u32,
     pub(crate) grid: GridParams,
     pub(crate) lru: LruParams,
+}
+
+/// How many blocks stopped rays of `RunAhead` request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LookAhead {
+    /// Active blocks on a ray's way, the missing one included; at least 1, which means none ahead, ever.
+    pub blocks: u32,
+    /// Rounds that count as missed before the first one; each doubles the blocks.
+    pub first_misses: u32,
+}
+
+impl LookAhead {
+    /// Nothing but what a ray needs.
+    pub const NONE: Self = Self { blocks: 1, first_misses: 0 };
 }
 
 pub(crate) const PARAMS_BYTES: u64 = size_of::<FrameParams>() as u64;
@@ -129,15 +147,16 @@ impl FrameView {
         })
     }
 
-    /// The uniform for the kernels. `look_ahead` is how many active blocks a stopped ray of
-    /// `RunAhead` requests, the missing one included (at least 1).
+    /// The uniform for the kernels.
     pub fn params(
         &self,
         grid: Grid,
         lru: LruParams,
         isovalue: f32,
-        look_ahead: u32,
+        look_ahead: LookAhead,
     ) -> FrameParams {
+        let [shift_y, shift_z, shift_misses] = grid.packing();
+        let LookAhead { blocks: look_ahead, first_misses } = look_ahead;
         let narrow = |v: DVec3| v.as_vec3().to_array();
         let order = RayOrder::new(self.size);
         FrameParams {
@@ -156,6 +175,10 @@ impl FrameView {
             ray_level: order.level(),
             ray_columns: order.columns(),
             list_capacity: list_capacity(self.size) as u32,
+            first_misses,
+            shift_y,
+            shift_z,
+            shift_misses,
             pad0: 0,
             grid: GridParams::new(grid),
             lru,

@@ -22,7 +22,7 @@ pub use block_sorted::{BlockSorted, BlockSortedOptions, BlockSortedPlan};
 pub use camera::Camera;
 pub use draw::{Draw, DrawBuffers, DrawTarget};
 pub use error::Error;
-pub use frame::{FrameParams, FrameView};
+pub use frame::{FrameParams, FrameView, LookAhead};
 pub use gpu_primitives::wgpu;
 pub use order::RayOrder;
 pub use outputs::{

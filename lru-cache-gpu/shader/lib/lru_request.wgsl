@@ -23,6 +23,24 @@ fn lru_touch(slot: u32) {
     }
 }
 
+// Whether this invocation knows the clock already, and whether uses count.
+var<private> lru_clock_known: u32; // 0: not yet
+var<private> lru_uses_count: bool;
+
+// Like lru_touch while slots are short. As long as a quarter of the slots has never been used, nothing will be
+// evicted in this round, and most caches stay that empty: what was used when does not matter.
+fn lru_keep(slot: u32) {
+    if (lru_clock_known == 0u) {
+        lru_clock_known = atomicLoad(&lru_state[LRU_CLOCK]);
+        let slots = lru_params().slots;
+        lru_uses_count = atomicLoad(&lru_state[LRU_NEXT_FREE]) + slots / 4u >= slots;
+    }
+    if (lru_uses_count && atomicLoad(&lru_state[lru_stamp_word(slot)]) != lru_clock_known
+        && atomicExchange(&lru_state[lru_stamp_word(slot)], lru_clock_known) != lru_clock_known) {
+        atomicAdd(&lru_state[LRU_USED_TOTAL], 1u);
+    }
+}
+
 // Asks for a block that a look-up did not find, once however many rays ask: the first one puts it into
 // the request table. All try a block's places in the same order, and what a place holds stays until
 // the round is served. So a block stands in one place at most: whoever put it further on saw every

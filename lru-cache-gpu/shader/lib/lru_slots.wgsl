@@ -6,9 +6,10 @@
 // Sample x + 4y + 16z of the block in `slot`.
 fn lru_sample(slot: u32, offset: u32) -> f32 {
 #ifdef LRU_PAGES_2
+    // A power of two where there is more than one page.
     let per_page = lru_slots_per_page();
-    let page = slot / per_page;
-    let index = (slot - page * per_page) * 64u + offset;
+    let page = slot >> countTrailingZeros(per_page);
+    let index = (slot & (per_page - 1u)) * 64u + offset;
     if (page == 0u) {
         return lru_slots_0[index];
     }

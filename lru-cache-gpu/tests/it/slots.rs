@@ -48,8 +48,8 @@ pub(crate) fn sample_source(pages: u32) -> KernelSource {
 #[test]
 fn every_sample_of_every_page_is_found() {
     let gpu = gpu();
-    for (pages, slots) in [(1, 5u32), (2, 9), (3, 11), (3, 15), (4, 13), (4, 16)] {
-        let per_page = slots.div_ceil(pages);
+    for (pages, slots) in [(1, 5u32), (2, 9), (2, 16), (3, 11), (4, 13), (4, 16)] {
+        let per_page = slots.div_ceil(pages).next_power_of_two();
         let samples: Vec<f32> = (0..slots * 64).map(|i| i as f32 + 0.5).collect();
         let buffers: Vec<_> = samples
             .chunks(per_page as usize * 64)

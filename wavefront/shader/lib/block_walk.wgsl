@@ -13,6 +13,7 @@ struct CellPlace {
 struct BlockWalk {
     hit: bool,
     missing: bool,         // stopped at a cell with samples that are not at hand
+    cells: u32,            // cells visited before `place`
     place: CellPlace,      // the hit's cell and how it was entered, or the first cell after the block
     exit: DdaEvent,        // where the ray leaves the hit's cell
     corners: CellCorners,  // of the hit's cell
@@ -59,33 +60,37 @@ fn block_corners(cell: vec3<i32>, isovalue: f32) -> CellCorners {
     return CellCorners(low - vec4<f32>(isovalue), high - vec4<f32>(isovalue));
 }
 
-// Walks from `start` to the first crossing in `box`, to missing samples, or out of the box.
-fn block_walk(ray: DdaRay, start: CellPlace, box: DdaBox, isovalue: f32) -> BlockWalk {
+// Walks from `start` to the first crossing in `box`, to missing samples, or out of the box. The first
+// `known` cells have no crossing.
+fn block_walk(ray: DdaRay, start: CellPlace, box: DdaBox, isovalue: f32, known: u32) -> BlockWalk {
     var walk: BlockWalk;
     walk.place = start;
     while (all(walk.place.cell >= box.low) && all(walk.place.cell <= box.high)) {
         let cell = walk.place.cell;
         walk.exit = dda_cell_exit(ray, cell);
-        if (!block_take(block_cell_need(cell))) {
-            walk.missing = true;
-            return walk;
-        }
-        walk.corners = block_corners(cell, isovalue);
-        if (!cell_on_one_side(walk.corners)) {
-            walk.bernstein = cell_bernstein(
-                walk.corners,
-                cell_entry(ray, walk.place.event, cell),
-                cell_exit(ray, walk.exit, cell),
-            );
-            // The neighbours compute these sides from the same four samples in the same way.
-            walk.inside_low = walk.bernstein.x >= 0.0;
-            walk.bracket = cell_first_crossing(
-                walk.bernstein, walk.inside_low, walk.bernstein.w >= 0.0);
-            if (walk.bracket.found) {
-                walk.hit = true;
+        if (walk.cells >= known) {
+            if (!block_take(block_cell_need(cell))) {
+                walk.missing = true;
                 return walk;
             }
+            walk.corners = block_corners(cell, isovalue);
+            if (!cell_on_one_side(walk.corners)) {
+                walk.bernstein = cell_bernstein(
+                    walk.corners,
+                    cell_entry(ray, walk.place.event, cell),
+                    cell_exit(ray, walk.exit, cell),
+                );
+                // The neighbours compute these sides from the same four samples in the same way.
+                walk.inside_low = walk.bernstein.x >= 0.0;
+                walk.bracket = cell_first_crossing(
+                    walk.bernstein, walk.inside_low, walk.bernstein.w >= 0.0);
+                if (walk.bracket.found) {
+                    walk.hit = true;
+                    return walk;
+                }
+            }
         }
+        walk.cells++;
         walk.place = CellPlace(walk.exit, block_next(ray, cell, walk.exit));
     }
     return walk;

@@ -20,6 +20,11 @@ struct FrameParams {
     ray_level: u32,     // edge of the squares of the rays' order, as a power of two of tiles
     ray_columns: u32,   // squares in a row
     list_capacity: u32, // rays that the active list holds
+    first_misses: u32,  // of every ray: more look-ahead from the start
+    // Bits of a block's x and of its x and y in a ray's state, and of the whole position.
+    shift_y: u32,
+    shift_z: u32,
+    shift_misses: u32,
     pad0: u32,
     grid: MacrocellGrid,
     lru: LruParams,
@@ -53,14 +58,35 @@ fn frame_grid(frame: FrameParams, loaded: u32) -> MacrocellGrid {
 }
 
 // Status of a ray in the two upper bits of its state; the lower ones hold its block, those between them
-// the number of rounds in which it went on and missed a block.
+// a count.
 const RAY_ACTIVE: u32 = 0u;          // waits for its block, or has not started
 const RAY_HIT: u32 = 0x40000000u;    // has a hit in its block, not shaded yet
 const RAY_DONE: u32 = 0x80000000u;   // final
 const RAY_STATUS: u32 = 0xc0000000u;
-const RAY_BLOCK: u32 = 0x07ffffffu;
-const RAY_MISSES_SHIFT: u32 = 27u;
-const RAY_MOST_MISSES: u32 = 7u;
+const RAY_MOST_MISSES: u32 = 5u; // further look-ahead is no use
+
+// A block's position in a ray's state. Without a division, which is slow.
+fn frame_pack(frame: FrameParams, block: vec3<i32>) -> u32 {
+    return u32(block.x) | (u32(block.y) << frame.shift_y) | (u32(block.z) << frame.shift_z);
+}
+
+fn frame_unpack(frame: FrameParams, state: u32) -> vec3<i32> {
+    let ends = vec3<u32>(frame.shift_y, frame.shift_z, frame.shift_misses);
+    let place = vec3<u32>(state) & ((vec3<u32>(1u) << ends) - vec3<u32>(1u));
+    return vec3<i32>(place >> vec3<u32>(0u, frame.shift_y, frame.shift_z));
+}
+
+// The number above the position, which has `30 - shift_misses` bits: of an active ray its misses, of a hit the
+// cells of the block before it that have none.
+fn frame_count(frame: FrameParams, state: u32) -> u32 {
+    return (state & ~RAY_STATUS) >> frame.shift_misses;
+}
+
+// A state's count, as much of it as there are bits for.
+fn frame_pack_count(frame: FrameParams, count: u32) -> u32 {
+    let most = (1u << (30u - frame.shift_misses)) - 1u;
+    return min(count, most) << frame.shift_misses;
+}
 
 // The rays' buffer: these words, a state for every number, a bit for every number whose ray is active,
 // and the active list: the numbers of the first active rays.
@@ -92,7 +118,9 @@ fn frame_pixel(frame: FrameParams, ray: u32) -> vec2<u32> {
     let bits = 2u * (3u + frame.ray_level);
     let square = ray >> bits;
     let code = ray & ((1u << bits) - 1u);
-    let corner = vec2<u32>(square % frame.ray_columns, square / frame.ray_columns);
+    // Exact for the fewer than 2^20 squares that there can be; an integer division is slow.
+    let row = u32((f32(square) + 0.5) / f32(frame.ray_columns));
+    let corner = vec2<u32>(square - row * frame.ray_columns, row);
     return corner * (8u << frame.ray_level) + frame_even_bits(vec2<u32>(code, code >> 1u));
 }
 

@@ -14,7 +14,7 @@ use macrocell::cpu::ranges;
 use macrocell::cpu::skip::Masks;
 use proptest::test_runner::{Config as ProptestConfig, RngSeed};
 use wavefront::{
-    Camera, FrameParams, FrameView, OutputTextures, Outputs, RayBuffers, Rays, RunAhead,
+    Camera, FrameParams, FrameView, LookAhead, OutputTextures, Outputs, RayBuffers, Rays, RunAhead,
     SampleLayout, Samples, Scene, Shading, ShadingParams, Strategy, WavefrontPlan, wgpu,
 };
 
@@ -168,7 +168,7 @@ impl Stage {
     /// Parameters of a shot's frame, for the twin.
     pub(crate) fn params(&self, shot: &Shot<'_>) -> FrameParams {
         let plan = self.cache_plan(shot.field);
-        shot.view().params(shot.field.grid(), plan.params(), shot.isovalue, 1)
+        shot.view().params(shot.field.grid(), plan.params(), shot.isovalue, LookAhead::NONE)
     }
 
     fn cache_plan(&self, field: &Field) -> CachePlan {
@@ -209,7 +209,7 @@ impl Stage {
         (0..blocks).for_each(|block| twin.insert(block, block));
         self.store(&mut encoder, cache.directory(), &twin.directory);
         let view = shot.view();
-        let params = view.params(shot.field.grid(), plan.params(), shot.isovalue, 1);
+        let params = view.params(shot.field.grid(), plan.params(), shot.isovalue, LookAhead::NONE);
         let identity = glam::DMat4::IDENTITY.to_cols_array_2d();
         let shading = ShadingParams::new(&Shading::default(), identity);
         let mut upload = UploadRing::new(&ledger, "test", 1024);
