@@ -7,8 +7,12 @@ use crate::plot::{Axis, Bars, Lines, Scale, Series};
 use crate::rows::Row;
 use crate::support::{Failure, write_file};
 
-/// Writes `cold.svg`, `warm.svg` and, for every volume and size, `progress-*.svg`.
+/// Writes `cold.svg`, `warm.svg` and, for every volume and size, `progress-*.svg`; of the set
+/// "scaling" `scaling.svg` alone.
 pub fn write(folder: &Path, rows: &[Row], frames: &[FrameRow]) -> Result<(), Failure> {
+    if rows.iter().any(|row| row.key.volume.starts_with("patch")) {
+        return write_file(&folder.join("scaling.svg"), scaling(rows).svg().as_bytes());
+    }
     for (state, title) in [("cold", "Cold frame"), ("warm", "The same view again")] {
         let chart = bars(rows, state, title);
         if !chart.groups.is_empty() {
@@ -25,6 +29,42 @@ pub fn write(folder: &Path, rows: &[Row], frames: &[FrameRow]) -> Result<(), Fai
         }
     }
     Ok(())
+}
+
+/// Milliseconds over the volume's edge.
+fn scaling(rows: &[Row]) -> Lines {
+    let mut series: Vec<Series> = Vec::new();
+    let mut edges: Vec<f64> = Vec::new();
+    for row in rows {
+        let Some((name, edge)) = row.key.volume.rsplit_once('-') else { continue };
+        let Ok(edge) = edge.parse::<f64>() else { continue };
+        let what = if name == "patch" { "patch" } else { "whole field" };
+        let setting = row.key.setting.split(',').next().unwrap_or_default();
+        let label = format!("{setting}, {what}, {}", row.key.state);
+        let points = match series.iter_mut().find(|series| series.label == label) {
+            Some(series) => &mut series.points,
+            None => {
+                series.push(Series { label, points: Vec::new(), steps: false });
+                let last = series.len() - 1;
+                &mut series[last].points
+            }
+        };
+        points.push([edge, row.ms_100]);
+        edges.push(edge);
+    }
+    edges.sort_by(f64::total_cmp);
+    edges.dedup();
+    series.sort_by(|a, b| b.label.cmp(&a.label));
+    let all = || series.iter().flat_map(|series| &series.points);
+    Lines {
+        title: "A patch of 256^3 voxels in larger volumes, and the whole field".into(),
+        x_label: "voxels on each axis of the volume".into(),
+        y_label: "ms to the finished picture (median)".into(),
+        x: Axis::around(Scale::Log, all().map(|p| p[0])),
+        y: Axis::around(Scale::Log, all().map(|p| p[1])),
+        x_ticks: edges,
+        series,
+    }
 }
 
 fn group(volume: &str, [width, height]: [u32; 2]) -> String {

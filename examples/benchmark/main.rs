@@ -20,11 +20,13 @@ mod needed;
 mod output;
 mod plot;
 mod rows;
+mod scaling;
 mod scene;
 mod sets;
 #[path = "../support/mod.rs"]
 mod support;
 mod tables;
+mod vtk;
 
 use std::path::PathBuf;
 
@@ -49,6 +51,10 @@ struct Arguments {
     /// Only volumes whose name contains this.
     #[arg(long)]
     volume: Option<String>,
+    /// Measure nothing: write the volume of the set vtk, decoded, to this file as raw 32-bit floats,
+    /// and beside it its stream (.zfp) and a view of it (.json).
+    #[arg(long, value_name = "FILE")]
+    export_raw: Option<PathBuf>,
 }
 
 impl Arguments {
@@ -65,11 +71,18 @@ fn main() {
 }
 
 fn run(arguments: &Arguments) -> Result<(), Failure> {
+    if let Some(path) = &arguments.export_raw {
+        return vtk::export(path);
+    }
     std::fs::create_dir_all(&arguments.out)?;
     let gpu = Gpu::new(arguments.adapter.as_deref())?;
     let origin = Origin::new(gpu.name());
     println!("adapter  {}", origin.adapter);
-    let results = strategies(arguments, &gpu)?;
+    let results = match arguments.set {
+        sets::Set::Vtk => return vtk::measure(&gpu, &origin, &arguments.out),
+        sets::Set::Scaling => scaling::measure(&gpu, |name| arguments.wants(name))?,
+        _ => strategies(arguments, &gpu)?,
+    };
     output::write(&arguments.out, &origin, &results)?;
     println!("benchmark.json, benchmark.md and plots are in {}", arguments.out.display());
     Ok(())
@@ -90,7 +103,7 @@ fn strategies(arguments: &Arguments, gpu: &Gpu) -> Result<Results, Failure> {
         last = last.filter(|scene| scene.subject == case.subject);
         let mut scene = match last.take() {
             Some(scene) => scene,
-            None => Scene::new(case.subject)?,
+            None => Scene::new(case.subject, true)?,
         };
         measure::case(gpu, arguments.set, &case, &mut scene, &mut results)?;
         last = Some(scene);

@@ -13,6 +13,7 @@ use crate::cpu_walk::Surface;
 use crate::frame::{CpuExtra, FrameRow, Key, Memory, Progress, Times};
 use crate::library::{ROUNDS_OF_MOVED, Wanted, residency, with_residency};
 use crate::needed::Needed;
+use crate::scaling::Ratio;
 use crate::scene::{Scene, View};
 use crate::sets::{Case, STEP_DEGREES, Set, Setting, run_ahead, settings};
 use crate::support::{Failure, Gpu, read_texture};
@@ -34,6 +35,8 @@ pub struct Skipped {
 pub struct Results {
     pub frames: Vec<FrameRow>,
     pub skipped: Vec<Skipped>,
+    /// Only of the set "scaling".
+    pub scaling: Vec<Ratio>,
 }
 
 /// The options of a setting's renderer.

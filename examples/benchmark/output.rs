@@ -9,6 +9,7 @@ use serde::Serialize;
 use crate::frame::FrameRow;
 use crate::measure::{Results, Skipped};
 use crate::rows::{Row, medians};
+use crate::scaling::Ratio;
 use crate::support::{Failure, write_file};
 use crate::{figures, tables};
 
@@ -35,17 +36,19 @@ struct File<'a> {
     origin: &'a Origin,
     rows: &'a [Row],
     skipped: &'a [Skipped],
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    scaling: &'a [Ratio],
     frames: &'a [FrameRow],
 }
 
 /// Writes everything, and the tables to the terminal.
 pub fn write(folder: &Path, origin: &Origin, results: &Results) -> Result<(), Failure> {
     let rows = medians(&results.frames);
-    let text = tables::all(origin, &rows, &results.skipped);
+    let text = tables::all(origin, &rows, results);
     println!("\n{text}");
     write_file(&folder.join("benchmark.md"), text.as_bytes())?;
-    let (skipped, frames) = (&results.skipped[..], &results.frames[..]);
-    write_json(folder, "benchmark.json", &File { origin, rows: &rows, skipped, frames })?;
+    let Results { frames, skipped, scaling } = results;
+    write_json(folder, "benchmark.json", &File { origin, rows: &rows, skipped, scaling, frames })?;
     figures::write(folder, &rows, frames)
 }
 

@@ -2,10 +2,10 @@
 
 use std::fmt::Write as _;
 
-const WIDTH: f64 = 900.0;
+const WIDTH: f64 = 1100.0;
 const HEIGHT: f64 = 480.0;
 /// Left, top, right and bottom of the area inside the axes; the legend is on its right.
-const AREA: [f64; 4] = [76.0, 44.0, 630.0, 420.0];
+const AREA: [f64; 4] = [76.0, 44.0, 810.0, 420.0];
 
 /// Told apart by people with any kind of colour vision (Okabe and Ito, 2008).
 const COLORS: [&str; 8] =
@@ -224,7 +224,8 @@ impl Lines {
 
     fn draw(&self, svg: &mut Svg, index: usize, series: &Series) {
         let mut path = String::new();
-        let mut last = None;
+        // Steps rise from the axis.
+        let mut last = series.steps.then_some(AREA[3]);
         for &[x, y] in &series.points {
             let (x, y) = (x_place(&self.x, x), y_place(&self.y, y));
             if let (true, Some(last)) = (series.steps, last) {

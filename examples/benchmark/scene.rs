@@ -16,6 +16,9 @@ use crate::support::Failure;
 /// Volumes with more voxels are not decoded on the CPU: 4 bytes each.
 const MOST_DECODED_VOXELS: u64 = 1 << 27;
 
+/// Vertical field of view.
+pub const FIELD_OF_VIEW_DEGREES: f64 = 50.0;
+
 pub struct Scene {
     pub subject: Subject,
     pub volume: CompressedVolume,
@@ -23,6 +26,8 @@ pub struct Scene {
     pub isovalue: f32,
     /// `None` for a large volume.
     pub decoded: Option<CpuVolume>,
+    /// What the camera looks at: a middle and the radius of a ball around it.
+    ball: ([f64; 3], f64),
     needed: HashMap<String, Needed>,
 }
 
@@ -46,22 +51,37 @@ pub fn stream(subject: &Subject) -> Result<(ZfpVolume, f32), Failure> {
 }
 
 impl Scene {
-    pub fn new(subject: Subject) -> Result<Self, Failure> {
+    /// Makes the volume; `decode`: for the CPU too, unless it is large.
+    pub fn new(subject: Subject, decode: bool) -> Result<Self, Failure> {
         let (zfp, isovalue) = stream(&subject)?;
-        let decoded = (zfp.voxel_count() <= MOST_DECODED_VOXELS)
+        let decoded = (decode && zfp.voxel_count() <= MOST_DECODED_VOXELS)
             .then(|| CpuVolume::decode(&zfp))
             .transpose()?;
-        let volume = CompressedVolume::try_from(&zfp)?;
-        Ok(Self { subject, volume, isovalue, decoded, needed: HashMap::new() })
+        Ok(Self { decoded, ..Self::of_stream(subject, &zfp, isovalue)? })
     }
 
-    /// The frame of a view. The volume fills the picture, its corners do not fit.
-    pub fn frame(&self, view: &View, look_ahead: u32, rounds: u32) -> Frame {
-        let (center, radius) = self.volume.bounding_ball();
+    /// A volume whose stream there is already.
+    pub fn of_stream(subject: Subject, zfp: &ZfpVolume, isovalue: f32) -> Result<Self, Failure> {
+        let volume = CompressedVolume::try_from(zfp)?;
+        let ball = match subject.volume {
+            "patch" => volumes::Patch::new(subject.dims).ball(),
+            _ => volume.bounding_ball(),
+        };
+        Ok(Self { subject, volume, isovalue, decoded: None, ball, needed: HashMap::new() })
+    }
+
+    /// The camera of a view. The volume fills the picture, its corners do not fit.
+    pub fn camera(&self, view: &View) -> Camera {
+        let (center, radius) = self.ball;
         let [azimuth, elevation] = view.position;
         let aspect = f64::from(view.size[0]) / f64::from(view.size[1]);
+        Camera::orbit(center, radius * 0.8, azimuth, elevation, FIELD_OF_VIEW_DEGREES, aspect)
+    }
+
+    /// The frame of a view.
+    pub fn frame(&self, view: &View, look_ahead: u32, rounds: u32) -> Frame {
         Frame {
-            camera: Camera::orbit(center, radius * 0.8, azimuth, elevation, 50.0, aspect),
+            camera: self.camera(view),
             isovalues: vec![view.isovalue],
             options: frame_options(look_ahead, rounds),
         }

@@ -105,7 +105,7 @@ fn full_residency() -> Setting {
     }
 }
 
-fn block_sorted(start_factor: u32, speculation: bool) -> Setting {
+pub fn block_sorted(start_factor: u32, speculation: bool) -> Setting {
     let options = BlockSortedOptions { start_factor, speculation };
     Setting {
         label: if speculation {
@@ -140,22 +140,22 @@ pub fn settings(set: Set, case: &Case) -> Vec<Setting> {
     settings
 }
 
-const TWO_POSITIONS: &[[f64; 2]] = &[[20.0, 15.0], [200.0, -25.0]];
-const FIVE_POSITIONS: &[[f64; 2]] =
+pub const TWO_POSITIONS: &[[f64; 2]] = &[[20.0, 15.0], [200.0, -25.0]];
+pub const FIVE_POSITIONS: &[[f64; 2]] =
     &[[20.0, 15.0], [92.0, -10.0], [164.0, 35.0], [236.0, -25.0], [308.0, 5.0]];
 
-const SMALL: [u32; 2] = [640, 368];
-const MIDDLE: [u32; 2] = [1280, 720];
+pub const SMALL: [u32; 2] = [640, 368];
+pub const MIDDLE: [u32; 2] = [1280, 720];
 const LARGE: [u32; 2] = [1920, 1088];
 
-fn cube(volume: &'static str, edge: u32, rate: f64) -> Subject {
+pub fn cube(volume: &'static str, edge: u32, rate: f64) -> Subject {
     Subject { volume, dims: [edge; 3], rate }
 }
 
 /// The bundled scan.
 pub const BRAIN: Subject = Subject { volume: "brain", dims: [193, 229, 193], rate: 4.0 };
 
-fn turbulence(edge: u32) -> Subject {
+pub fn turbulence(edge: u32) -> Subject {
     cube("turbulence", edge, 4.0)
 }
 

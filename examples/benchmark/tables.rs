@@ -2,9 +2,10 @@
 
 use std::fmt::Write as _;
 
-use crate::measure::Skipped;
+use crate::measure::{Results, Skipped};
 use crate::output::Origin;
 use crate::rows::Row;
+use crate::scaling::Ratio;
 
 /// A Markdown table; the first `text` columns are aligned to the left.
 pub struct Table {
@@ -66,23 +67,40 @@ fn other<'a>(rows: &'a [Row], row: &Row, state: &str) -> Option<&'a Row> {
     })
 }
 
-pub fn all(origin: &Origin, rows: &[Row], skipped: &[Skipped]) -> String {
+pub fn all(origin: &Origin, rows: &[Row], results: &Results) -> String {
     let Origin { adapter, commit, date, command } = origin;
     let mut text = format!(
         "`benchmark {command}`, {adapter}, commit {commit}, {date}. Medians over the views; \
          percentages count all pixels.\n\n"
     );
+    text += &scaling(&results.scaling);
     text += &strategies(rows);
     text += &moved(rows);
     text += &needed(rows);
     text += &cpu(rows);
     text += &memory(rows);
     let mut table = Table::new("Not measured", &["volume", "picture", "setting", "reason"], 4);
-    for Skipped { volume, size, setting, reason } in skipped {
+    for Skipped { volume, size, setting, reason } in &results.skipped {
         let size = format!("{}x{}", size[0], size[1]);
         table.line(&[volume.clone(), size, setting.clone(), reason.clone()]);
     }
     text + &table.finish()
+}
+
+fn scaling(ratios: &[Ratio]) -> String {
+    let heads =
+        ["setting", "state", "ms in the smallest", "ms in the largest", "largest / smallest"];
+    let mut table = Table::new("A patch of 256^3 voxels in volumes that grow", &heads, 2);
+    for Ratio { setting, state, ms_smallest, ms_largest, ratio } in ratios {
+        table.line(&[
+            setting.clone(),
+            (*state).into(),
+            format!("{ms_smallest:.0}"),
+            format!("{ms_largest:.0}"),
+            format!("{ratio:.2}"),
+        ]);
+    }
+    table.finish()
 }
 
 fn strategies(rows: &[Row]) -> String {
