@@ -4,19 +4,18 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use progressive_iso::{ProgressiveIsoRenderer, RendererOptions};
 use serde::Serialize;
 use volume_io::ReadOptions;
 
 use crate::cpu_volume::CpuVolume;
-use crate::library::{Wanted, frame_options, with_residency};
+use crate::library::{self, Wanted, with_residency};
 use crate::output::{Origin, write_json};
 use crate::scene::{FIELD_OF_VIEW_DEGREES, Scene, View, stream};
 use crate::sets::{MIDDLE, Subject, cube, default_look_ahead, turbulence};
-use crate::support::{Failure, Gpu, resident_bytes, write_file};
+use crate::support::{Failure, Gpu, reset_resident_peak, resident_bytes, write_file};
 
 /// Repetitions, each with a new renderer.
 const REPEATS: usize = 5;
@@ -156,11 +155,11 @@ fn run(
     after_warm_up: Option<u64>,
 ) -> Result<Option<Run>, Failure> {
     let with_input = resident_bytes().map(|[now, _]| now);
-    let watch = Watch::start();
+    reset_resident_peak();
     let Some(mut run) = picture(gpu, scene, &view(scene.isovalue), residency)? else {
         return Ok(None);
     };
-    let most = watch.stop();
+    let most = resident_bytes().map(|[_, most]| most);
     let above = |base: Option<u64>| Some(most?.saturating_sub(base?));
     run.growth_bytes = above(after_warm_up);
     run.growth_without_input_bytes = above(with_input);
@@ -183,22 +182,22 @@ fn picture(
         scene.volume.clone(),
         with_residency(options, residency),
     )?;
-    if crate::library::residency(renderer.plan()) != residency {
+    if library::residency(renderer.plan()) != residency {
         return Ok(None);
     }
     let pipelines_ms = begin.elapsed().as_secs_f64() * 1e3;
     let begin = Instant::now();
     let elapsed = || begin.elapsed().as_secs_f64() * 1e3;
-    let mut frame = scene.frame(view, default_look_ahead(), 1);
-    frame.options = frame_options(default_look_ahead(), 1);
-    renderer.set_frame(&frame)?;
+    renderer.set_frame(&scene.frame(view, default_look_ahead(), 1))?;
     renderer.render_to_completion(device, queue, |_, report| report.pass == 0)?;
     let load_ms = elapsed();
     let report = renderer.render_to_completion(device, queue, |_, _| true)?;
     let draw_ms = elapsed() - load_ms;
     let capture = renderer.capture_blocking(device, queue)?;
     let picture_ms = elapsed();
-    assert_eq!(capture.size, view.size, "the picture's size");
+    if capture.size != view.size {
+        return Err("the picture has another size".into());
+    }
     Ok(Some(Run {
         residency,
         pipelines_ms,
@@ -211,33 +210,4 @@ fn picture(
         peak_bytes: report.peak_bytes,
         hits: report.hits,
     }))
-}
-
-/// Looks at the resident memory again and again.
-struct Watch {
-    stop: Arc<AtomicBool>,
-    most: Arc<AtomicU64>,
-    thread: std::thread::JoinHandle<()>,
-}
-
-impl Watch {
-    fn start() -> Self {
-        let (stop, most) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU64::new(0)));
-        let (seen_stop, seen_most) = (Arc::clone(&stop), Arc::clone(&most));
-        let thread = std::thread::spawn(move || {
-            while !seen_stop.load(Ordering::Relaxed) {
-                let now = resident_bytes().map_or(0, |[now, _]| now);
-                seen_most.fetch_max(now, Ordering::Relaxed);
-                std::thread::sleep(Duration::from_millis(2));
-            }
-        });
-        Self { stop, most, thread }
-    }
-
-    /// The most that was seen; `None` where the system does not say.
-    fn stop(self) -> Option<u64> {
-        self.stop.store(true, Ordering::Relaxed);
-        self.thread.join().ok()?;
-        Some(self.most.load(Ordering::Relaxed)).filter(|&most| most > 0)
-    }
 }

@@ -137,6 +137,13 @@ pub fn resident_bytes() -> Option<[u64; 2]> {
     Some([kilobytes("VmRSS:")? * 1024, kilobytes("VmHWM:")? * 1024])
 }
 
+/// Lets the peak of [`resident_bytes`] start again from what is resident now, where the system
+/// allows it.
+pub fn reset_resident_peak() {
+    // Elsewhere the peak stays that of the whole process.
+    std::fs::write("/proc/self/clear_refs", "5").unwrap_or_default();
+}
+
 /// One pass of a report file.
 #[derive(Serialize, Clone, Debug)]
 pub struct PassEntry {
