@@ -29,6 +29,7 @@ pub struct Ratio {
     pub state: &'static str,
     pub ms_smallest: f64,
     pub ms_largest: f64,
+    /// Median over the views.
     pub ratio: f64,
 }
 
@@ -110,17 +111,25 @@ fn ratios(results: &Results) -> Vec<Ratio> {
     let mut ratios = Vec::new();
     for setting in settings() {
         for state in ["cold", "warm"] {
-            let ms = |volume: &str| {
+            let times = |volume: &str| -> Vec<f64> {
                 let frames = results.frames.iter().filter(|frame| {
                     let key = &frame.key;
                     (&*key.volume, &key.setting, key.state) == (volume, &setting.label, state)
                 });
-                median(frames.map(|frame| frame.times.ms_100))
+                frames.map(|frame| frame.times.ms_100).collect()
             };
-            let (ms_smallest, ms_largest) = (ms("patch-256"), ms("patch-1024"));
-            if ms_smallest.is_finite() && ms_largest.is_finite() {
-                let (setting, ratio) = (setting.label.clone(), ms_largest / ms_smallest);
-                ratios.push(Ratio { setting, state, ms_smallest, ms_largest, ratio });
+            let (smallest, largest) = (times("patch-256"), times("patch-1024"));
+            if !smallest.is_empty() && smallest.len() == largest.len() {
+                ratios.push(Ratio {
+                    setting: setting.label.clone(),
+                    state,
+                    // Of frames that followed each other, so that the machine was the same for both.
+                    ratio: median(
+                        largest.iter().zip(&smallest).map(|(large, small)| large / small),
+                    ),
+                    ms_smallest: median(smallest.into_iter()),
+                    ms_largest: median(largest.into_iter()),
+                });
             }
         }
     }

@@ -122,15 +122,16 @@ pub fn block_sorted(start_factor: u32, speculation: bool) -> Setting {
 
 /// The ways of rendering a case, in the order in which they take turns.
 pub fn settings(set: Set, case: &Case) -> Vec<Setting> {
+    let voxels: u64 = case.subject.dims.iter().map(|&n| u64::from(n)).product();
+    let other_default = default_look_ahead() != 1;
     let mut settings = vec![run_ahead(1), block_sorted(1, true)];
-    if default_look_ahead() != 1 {
-        settings.push(run_ahead(default_look_ahead()));
+    settings.extend(other_default.then(|| run_ahead(default_look_ahead())));
+    if voxels > 1 << 27 {
+        // Loading takes minutes for each.
+        return settings;
     }
     settings.push(block_sorted(2, true));
-    let voxels: u64 = case.subject.dims.iter().map(|&n| u64::from(n)).product();
-    if voxels <= 1 << 24 {
-        settings.push(full_residency());
-    }
+    settings.extend((voxels <= 1 << 24).then(full_residency));
     settings.extend([block_sorted(4, true), block_sorted(8, true)]);
     if set == Set::Full {
         settings.push(block_sorted(1, false));
@@ -208,13 +209,17 @@ fn ci() -> Vec<Case> {
 
 fn full() -> Vec<Case> {
     let mut cases = ci();
-    let large = |subject, size| Case { budget_bytes: 2 << 30, ..brief(subject, size) };
+    let large = |subject, size, gigabytes: u64| Case {
+        budget_bytes: gigabytes << 30,
+        ..brief(subject, size)
+    };
+    let huge = Subject { volume: "mixing-layer", dims: [2048, 2048, 1920], rate: 1.0 };
     cases.extend([
         brief(turbulence(512), MIDDLE),
         brief(cube("shells", 512, 2.0), MIDDLE),
         brief(cube("rough-solid", 512, 4.0), LARGE),
-        large(turbulence(1024), MIDDLE),
-        large(Subject { volume: "mixing-layer", dims: [2048, 2048, 1920], rate: 1.0 }, LARGE),
+        large(turbulence(1024), MIDDLE, 2),
+        large(huge, LARGE, 3),
     ]);
     cases
 }
