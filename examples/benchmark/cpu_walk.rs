@@ -114,12 +114,12 @@ impl Surface<'_> {
             let inside = corners.iter().filter(|&&value| value >= 0.0).count();
             let crosses = inside != 0 && inside != 8;
             visitor.cell(cell, crosses);
-            if crosses {
-                if let Some(hit) = intersect(ray, cell, &corners, [t, next[axis].max(t)]) {
-                    return Ok(hit);
-                }
+            let end = next[axis].max(t);
+            let hit = crosses.then(|| intersect(ray, cell, &corners, [t, end])).flatten();
+            if let Some(hit) = hit {
+                return Ok(hit);
             }
-            t = next[axis].max(t);
+            t = end;
             let (before, step) = (cell[axis], if ray.direction[axis] > 0.0 { 1 } else { -1 });
             cell[axis] += step;
             // Another block, or the end of the volume inside the last one.

@@ -85,8 +85,10 @@ fn generate_with(
     let bits_per_block = bits_per_block(rate)?;
     let length = blocks.div_ceil(CHUNK) * CHUNK * u64::from(bits_per_block) / 8;
     let mut bytes = Vec::new();
-    let room = usize::try_from(length).map_err(|_| Error::OutOfMemory { bytes: length })?;
-    bytes.try_reserve_exact(room).map_err(|_| Error::OutOfMemory { bytes: length })?;
+    let room = usize::try_from(length).unwrap_or(usize::MAX);
+    if bytes.try_reserve_exact(room).is_err() {
+        return Err(Error::OutOfMemory { bytes: length });
+    }
     thread::scope(|scope| {
         let workers = Workers::start(scope, field, dims, rate, threads);
         for chunk in 0..blocks.div_ceil(CHUNK) {
