@@ -2,30 +2,47 @@
 //!
 //! Protocol: for every volume, isovalues x orbit positions with fixed seeds; every setting keeps its
 //! own renderer, and the settings take turns at every view, so that all of them see the same machine.
-//! Cold frames start with an empty cache and a loaded volume; warm frames repeat the view. Writes
-//! `benchmark.json` (every frame, and medians over the views) and `benchmark.md`.
+//! Cold frames start with an empty cache and a loaded volume, warm frames repeat the view, moved
+//! frames follow it on a short orbit. Writes `benchmark.json` (every frame, and medians over the
+//! views; `docs/benchmark.md` explains the keys), `benchmark.md` and plots.
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a command-line program")]
 #![allow(unreachable_pub, reason = "the modules are private to this program")]
 
+mod cpu_renderer;
+mod cpu_volume;
+mod cpu_walk;
+mod figures;
+mod frame;
+mod library;
 mod measure;
+mod needed;
 mod output;
+mod plot;
+mod rows;
+mod scaling;
+mod scene;
 mod sets;
 #[path = "../support/mod.rs"]
 mod support;
+mod tables;
+mod vtk;
 
 use std::path::PathBuf;
 
 use clap::Parser;
+use measure::Results;
+use output::Origin;
+use scene::Scene;
 use support::{Failure, Gpu};
 
 /// Measures both strategies on fixed views.
 #[derive(Parser)]
 struct Arguments {
-    /// What is measured: quick (under a minute on two cores), ci, full.
+    /// What is measured.
     #[arg(long, value_enum, default_value_t = sets::Set::Quick)]
     set: sets::Set,
-    /// Folder for benchmark.json and benchmark.md.
+    /// Folder for everything that is written.
     #[arg(long, default_value = "out/benchmark")]
     out: PathBuf,
     /// Part of an adapter's name; see the example `render --list-adapters`.
@@ -34,6 +51,16 @@ struct Arguments {
     /// Only volumes whose name contains this.
     #[arg(long)]
     volume: Option<String>,
+    /// Measure nothing: write the volume of the set vtk, decoded, to this file as raw 32-bit floats,
+    /// and beside it its stream (.zfp) and a view of it (.json).
+    #[arg(long, value_name = "FILE")]
+    export_raw: Option<PathBuf>,
+}
+
+impl Arguments {
+    fn wants(&self, name: &str) -> bool {
+        self.volume.as_ref().is_none_or(|part| name.contains(part.as_str()))
+    }
 }
 
 fn main() {
@@ -44,24 +71,42 @@ fn main() {
 }
 
 fn run(arguments: &Arguments) -> Result<(), Failure> {
+    if let Some(path) = &arguments.export_raw {
+        return vtk::export(path);
+    }
     std::fs::create_dir_all(&arguments.out)?;
     let gpu = Gpu::new(arguments.adapter.as_deref())?;
-    println!("adapter  {}", gpu.name());
-    let mut frames = Vec::new();
+    let origin = Origin::new(gpu.name());
+    println!("adapter  {}", origin.adapter);
+    let results = match arguments.set {
+        sets::Set::Vtk => return vtk::measure(&gpu, &origin, &arguments.out),
+        sets::Set::Scaling => scaling::measure(&gpu, |name| arguments.wants(name))?,
+        _ => strategies(arguments, &gpu)?,
+    };
+    output::write(&arguments.out, &origin, &results)?;
+    println!("benchmark.json, benchmark.md and plots are in {}", arguments.out.display());
+    Ok(())
+}
+
+/// All cases of a set.
+fn strategies(arguments: &Arguments, gpu: &Gpu) -> Result<Results, Failure> {
+    let mut results = Results::default();
+    let mut last: Option<Scene> = None;
     for case in sets::cases(arguments.set) {
-        if arguments.volume.as_ref().is_some_and(|part| !case.name().contains(part.as_str())) {
+        let name = case.subject.name();
+        if !arguments.wants(&name) {
             continue;
         }
-        println!(
-            "{} at {} bits per voxel, {}x{}",
-            case.name(),
-            case.rate,
-            case.size[0],
-            case.size[1]
-        );
-        frames.extend(measure::case(&gpu, &case)?);
+        let [width, height] = case.size;
+        println!("{name} at {} bits per voxel, {width}x{height}", case.subject.rate);
+        // A volume of the case before goes before the next one is made.
+        last = last.filter(|scene| scene.subject == case.subject);
+        let mut scene = match last.take() {
+            Some(scene) => scene,
+            None => Scene::new(case.subject, true)?,
+        };
+        measure::case(gpu, arguments.set, &case, &mut scene, &mut results)?;
+        last = Some(scene);
     }
-    output::write(&arguments.out, &gpu.name(), frames)?;
-    println!("benchmark.json and benchmark.md are in {}", arguments.out.display());
-    Ok(())
+    Ok(results)
 }

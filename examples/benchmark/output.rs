@@ -1,59 +1,59 @@
-//! Medians, `benchmark.json` and `benchmark.md`.
+//! Writes `benchmark.json`, `benchmark.md` and the plots.
 
-use std::fmt::Write as _;
 use std::path::Path;
 use std::process::Command;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::Serialize;
 
-use crate::measure::FrameRow;
+use crate::frame::FrameRow;
+use crate::measure::{Results, Skipped};
+use crate::rows::{Row, medians};
+use crate::scaling::Ratio;
 use crate::support::{Failure, write_file};
+use crate::{figures, tables};
 
-/// Medians over the views of one setting on one volume.
+/// Where and when something was measured.
 #[derive(Clone, Debug, Serialize)]
-struct Row {
-    volume: String,
-    rate: f64,
-    size: [u32; 2],
-    setting: String,
-    strategy: String,
-    start_factor: u32,
-    look_ahead: u32,
-    residency: String,
-    state: String,
-    views: usize,
-    ms_85: f64,
-    ms_100: f64,
-    /// Smallest and largest time of the views.
-    ms_100_spread: [f64; 2],
-    passes_100: f64,
-    waits: f64,
-    submissions: f64,
-    decoded_unique: Option<f64>,
-    decoded_total: f64,
-    overhead_bytes: u64,
-    compressed_bytes: u64,
-    peak_bytes: u64,
-    setup_ms: f64,
+pub struct Origin {
+    pub adapter: String,
+    pub commit: String,
+    /// Day, in universal time.
+    pub date: String,
+    pub command: String,
+}
+
+impl Origin {
+    pub fn new(adapter: String) -> Self {
+        let command = std::env::args().skip(1).collect::<Vec<_>>().join(" ");
+        Self { adapter, commit: commit(), date: today(), command }
+    }
 }
 
 #[derive(Serialize)]
-struct File {
-    adapter: String,
-    commit: String,
-    rows: Vec<Row>,
-    frames: Vec<FrameRow>,
+struct File<'a> {
+    #[serde(flatten)]
+    origin: &'a Origin,
+    rows: &'a [Row],
+    skipped: &'a [Skipped],
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    scaling: &'a [Ratio],
+    frames: &'a [FrameRow],
 }
 
-/// Writes both files.
-pub fn write(folder: &Path, adapter: &str, frames: Vec<FrameRow>) -> Result<(), Failure> {
-    let rows = medians(&frames);
-    let commit = commit();
-    let table = markdown(adapter, &commit, &rows);
-    println!("\n{table}");
-    write_file(&folder.join("benchmark.md"), table.as_bytes())?;
-    let file = File { adapter: adapter.into(), commit, rows, frames };
-    write_file(&folder.join("benchmark.json"), serde_json::to_string_pretty(&file)?.as_bytes())
+/// Writes everything, and the tables to the terminal.
+pub fn write(folder: &Path, origin: &Origin, results: &Results) -> Result<(), Failure> {
+    let rows = medians(&results.frames);
+    let text = tables::all(origin, &rows, results);
+    println!("\n{text}");
+    write_file(&folder.join("benchmark.md"), text.as_bytes())?;
+    let Results { frames, skipped, scaling } = results;
+    write_json(folder, "benchmark.json", &File { origin, rows: &rows, skipped, scaling, frames })?;
+    figures::write(folder, &rows, frames)
+}
+
+pub fn write_json(folder: &Path, name: &str, value: &impl Serialize) -> Result<(), Failure> {
+    write_file(&folder.join(name), serde_json::to_string_pretty(value)?.as_bytes())
 }
 
 fn commit() -> String {
@@ -65,92 +65,30 @@ fn commit() -> String {
         .map_or_else(|| "unknown".into(), |o| String::from_utf8_lossy(&o.stdout).trim().into())
 }
 
-/// Middle value; the mean of the two middle ones for an even count.
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    match values.len() {
-        0 => f64::NAN,
-        n if n % 2 == 1 => values[n / 2],
-        n => (values[n / 2 - 1] + values[n / 2]) / 2.0,
-    }
+/// The day as year-month-day.
+fn today() -> String {
+    let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
+    let [year, month, day] = civil_day(seconds / 86_400);
+    format!("{year:04}-{month:02}-{day:02}")
 }
 
-fn medians(frames: &[FrameRow]) -> Vec<Row> {
-    let mut groups: Vec<Vec<&FrameRow>> = Vec::new();
-    let key = |f: &FrameRow| (f.volume.clone(), f.size, f.setting.clone(), f.state.clone());
-    for frame in frames {
-        match groups.iter_mut().find(|group| key(group[0]) == key(frame)) {
-            Some(group) => group.push(frame),
-            None => groups.push(vec![frame]),
+/// The Gregorian date of a number of days after 1 January 1970.
+fn civil_day(mut days: u64) -> [u64; 3] {
+    let leap =
+        |year: u64| year.is_multiple_of(4) && !year.is_multiple_of(100) || year.is_multiple_of(400);
+    let mut year = 1970;
+    while days >= 365 + u64::from(leap(year)) {
+        days -= 365 + u64::from(leap(year));
+        year += 1;
+    }
+    let february = 28 + u64::from(leap(year));
+    let mut month = 1;
+    for length in [31, february, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31] {
+        if days < length {
+            break;
         }
+        days -= length;
+        month += 1;
     }
-    groups.iter().map(|group| row(group)).collect()
-}
-
-fn row(group: &[&FrameRow]) -> Row {
-    let first = group[0];
-    let of = |value: fn(&FrameRow) -> f64| median(group.iter().map(|f| value(f)));
-    let ends = group.iter().map(|f| f.ms_100);
-    let unique = group.iter().all(|f| f.decoded_unique.is_some());
-    Row {
-        volume: first.volume.clone(),
-        rate: first.rate,
-        size: first.size,
-        setting: first.setting.clone(),
-        strategy: first.strategy.clone(),
-        start_factor: first.start_factor,
-        look_ahead: first.look_ahead,
-        residency: first.residency.clone(),
-        state: first.state.clone(),
-        views: group.len(),
-        ms_85: of(|f| f.ms_85),
-        ms_100: of(|f| f.ms_100),
-        ms_100_spread: [
-            ends.clone().fold(f64::INFINITY, f64::min),
-            ends.fold(f64::NEG_INFINITY, f64::max),
-        ],
-        passes_100: of(|f| f64::from(f.passes_100)),
-        waits: of(|f| f64::from(f.waits)),
-        submissions: of(|f| f64::from(f.submissions)),
-        decoded_unique: unique.then(|| of(|f| f64::from(f.decoded_total))),
-        decoded_total: of(|f| f64::from(f.decoded_total)),
-        overhead_bytes: group.iter().map(|f| f.overhead_bytes).max().unwrap_or(0),
-        compressed_bytes: first.compressed_bytes,
-        peak_bytes: group.iter().map(|f| f.peak_bytes).max().unwrap_or(0),
-        setup_ms: first.setup_ms,
-    }
-}
-
-fn markdown(adapter: &str, commit: &str, rows: &[Row]) -> String {
-    let mut text = format!("Adapter: {adapter}. Commit: {commit}. Medians over the views.\n\n");
-    text += "| volume | picture | setting | passes cold | ms to 85 % | ms to 100 % | blocks decoded | passes warm | ms warm |\n";
-    text += "| --- | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: |\n";
-    for cold in rows.iter().filter(|row| row.state == "cold") {
-        let same = |row: &&Row| {
-            row.state == "warm"
-                && row.volume == cold.volume
-                && row.size == cold.size
-                && row.setting == cold.setting
-        };
-        let (passes, ms) =
-            rows.iter().find(same).map_or((f64::NAN, f64::NAN), |w| (w.passes_100, w.ms_100));
-        // Writing to a String does not fail.
-        writeln!(
-            text,
-            "| {} | {}x{} | {} | {} | {:.0} | {:.0} | {} | {} | {:.0} |",
-            cold.volume,
-            cold.size[0],
-            cold.size[1],
-            cold.setting,
-            cold.passes_100,
-            cold.ms_85,
-            cold.ms_100,
-            cold.decoded_total,
-            passes,
-            ms,
-        )
-        .unwrap_or_default();
-    }
-    text
+    [year, month, days + 1]
 }

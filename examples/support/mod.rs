@@ -97,6 +97,53 @@ impl Gpu {
     }
 }
 
+/// Reads a texture of four bytes per pixel back, row 0 on top, blocking on the device. Its memory is
+/// the caller's, not the renderer's.
+pub fn read_texture(gpu: &Gpu, texture: &wgpu::Texture) -> Result<Vec<u8>, Failure> {
+    let row = u64::from(texture.width()) * 4;
+    let padded = row.next_multiple_of(u64::from(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT));
+    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("example.read_texture"),
+        size: padded * u64::from(texture.height()),
+        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    let layout = wgpu::TexelCopyBufferLayout {
+        offset: 0,
+        bytes_per_row: Some(padded as u32),
+        rows_per_image: None,
+    };
+    let target = wgpu::TexelCopyBufferInfo { buffer: &buffer, layout };
+    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    encoder.copy_texture_to_buffer(texture.as_image_copy(), target, texture.size());
+    encoder.map_buffer_on_submit(&buffer, wgpu::MapMode::Read, .., |_| {});
+    #[expect(clippy::disallowed_methods, reason = "the program owns the queue")]
+    gpu.queue.submit([encoder.finish()]);
+    #[expect(clippy::disallowed_methods, reason = "the program may block")]
+    gpu.device.poll(wgpu::PollType::wait_indefinitely())?;
+    let view = buffer.get_mapped_range(..)?;
+    let rows = view.chunks_exact(padded as usize);
+    Ok(rows.flat_map(|padded| &padded[..row as usize]).copied().collect())
+}
+
+/// Resident memory of this process in bytes, now and at its peak; `None` where the system does not
+/// say.
+pub fn resident_bytes() -> Option<[u64; 2]> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let kilobytes = |name: &str| -> Option<u64> {
+        let line = status.lines().find_map(|line| line.strip_prefix(name))?;
+        line.split_whitespace().next()?.parse().ok()
+    };
+    Some([kilobytes("VmRSS:")? * 1024, kilobytes("VmHWM:")? * 1024])
+}
+
+/// Lets the peak of [`resident_bytes`] start again from what is resident now, where the system
+/// allows it.
+pub fn reset_resident_peak() {
+    // Elsewhere the peak stays that of the whole process.
+    std::fs::write("/proc/self/clear_refs", "5").unwrap_or_default();
+}
+
 /// One pass of a report file.
 #[derive(Serialize, Clone, Debug)]
 pub struct PassEntry {

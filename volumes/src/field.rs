@@ -1,7 +1,10 @@
 //! What a generator is, and the list of them.
 
 use crate::math::{Jet, Real};
-use crate::{Gyroid, MarschnerLobb, PlaneRamp, RoughSolid, Shells, SphereDistance, Turbulence};
+use crate::{
+    Gyroid, MarschnerLobb, MixingLayer, Patch, PlaneRamp, RoughSolid, Shells, SphereDistance,
+    Turbulence,
+};
 
 /// A scalar field over the index space of a volume: voxel (i, j, k) is the position `[i, j, k]`.
 pub trait Field: Send + Sync {
@@ -16,6 +19,22 @@ pub trait Field: Send + Sync {
 
     /// An isovalue whose surface shows what the field is made for.
     fn suggested_isovalue(&self) -> f64;
+
+    /// The 64 samples of the block whose first voxel is `origin`, sample (x, y, z) at x + 4 y + 16 z:
+    /// those of [`value`](Field::value), bit for bit. A field whose samples share work does it here.
+    fn block(&self, origin: [u32; 3]) -> [f32; 64] {
+        std::array::from_fn(|i| {
+            let offset = [i % 4, i / 4 % 4, i / 16];
+            let p = [0, 1, 2].map(|axis| f64::from(origin[axis] + offset[axis] as u32));
+            self.value(p) as f32
+        })
+    }
+
+    /// The value of all voxels from `low` to `high`, where the field knows without looking that they
+    /// are equal.
+    fn constant(&self, _low: [f64; 3], _high: [f64; 3]) -> Option<f64> {
+        None
+    }
 }
 
 /// A formula written once for values and for gradients.
@@ -28,8 +47,17 @@ pub(crate) trait Formula {
 }
 
 /// The names that [`by_name`] knows.
-pub const NAMES: &[&str] =
-    &["sphere", "plane", "marschner-lobb", "gyroid", "shells", "turbulence", "rough-solid"];
+pub const NAMES: &[&str] = &[
+    "sphere",
+    "plane",
+    "marschner-lobb",
+    "gyroid",
+    "shells",
+    "turbulence",
+    "rough-solid",
+    "patch",
+    "mixing-layer",
+];
 
 /// No generator has this name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -52,6 +80,8 @@ pub fn by_name(name: &str, dims: [u32; 3]) -> Result<Box<dyn Field>, UnknownFiel
         "shells" => Box::new(Shells::new(dims)),
         "turbulence" => Box::new(Turbulence::new(dims)),
         "rough-solid" => Box::new(RoughSolid::new(dims)),
+        "patch" => Box::new(Patch::new(dims)),
+        "mixing-layer" => Box::new(MixingLayer::new(dims)),
         _ => return Err(UnknownField { name: name.to_owned() }),
     })
 }

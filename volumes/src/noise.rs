@@ -12,6 +12,16 @@ fn scramble(mut x: u32) -> u32 {
     x ^ (x >> 16)
 }
 
+/// A number in [-1, 1] for every point of the integer lattice.
+pub(crate) fn lattice_value(position: [u32; 3], seed: u32) -> f64 {
+    let keys = [0, 1, 2].map(|axis| position[axis].wrapping_mul(MULTIPLIERS[axis]));
+    f64::from(scramble(keys[0] ^ keys[1] ^ keys[2] ^ scramble(seed))) * (2.0 / 4_294_967_295.0)
+        - 1.0
+}
+
+/// What the coordinates of a lattice point are multiplied with before they are mixed.
+const MULTIPLIERS: [u32; 3] = [0x9e37_79b1, 0x85eb_ca77, 0xc2b2_ae3d];
+
 /// The cube of the integer lattice that holds a position.
 struct Cell<T> {
     /// Position in the cube, each coordinate in [0, 1).
@@ -22,7 +32,6 @@ struct Cell<T> {
 
 impl<T: Real> Cell<T> {
     fn new(p: [T; 3], seed: u32) -> Self {
-        const MULTIPLIERS: [u32; 3] = [0x9e37_79b1, 0x85eb_ca77, 0xc2b2_ae3d];
         let mut fraction = p;
         let mut keys = [[0; 2]; 3];
         for axis in 0..3 {

@@ -2,8 +2,8 @@
 
 use proptest::prelude::*;
 use volumes::{
-    Field, Gyroid, MarschnerLobb, NAMES, PlaneRamp, RoughSolid, Shells, SphereDistance, Turbulence,
-    by_name, samples,
+    Field, Gyroid, MarschnerLobb, MixingLayer, NAMES, Patch, PlaneRamp, RoughSolid, Shells,
+    SphereDistance, Turbulence, by_name, samples,
 };
 
 const DIMS: [u32; 3] = [48, 40, 56];
@@ -164,6 +164,61 @@ fn the_rough_solid_is_porous_and_speckled() {
 }
 
 #[test]
+fn the_patch_is_the_same_in_every_volume_and_constant_at_its_faces() {
+    let (small, large) = (Patch::new([256; 3]), Patch::new([768, 512, 256]));
+    assert_eq!(small.ball().0, [127.5; 3]);
+    let offset = [256.0, 128.0, 0.0];
+    assert_eq!(large.ball().0, [0, 1, 2].map(|a| 127.5 + offset[a]));
+    for p in [[40.0, 128.0, 70.0], [7.0, 9.0, 30.0], [3.0, 128.0, 128.0], [250.0; 3]] {
+        assert_eq!(small.value(p), large.value([0, 1, 2].map(|a| p[a] + offset[a])));
+    }
+    for face in [[2.0, 128.0, 128.0], [128.0, 253.0, 128.0], [128.0, 128.0, 252.0]] {
+        assert_eq!(small.value(face), 1.0);
+        assert_eq!(small.constant(face, face), Some(1.0));
+    }
+    assert_eq!(small.constant([0.0; 3], [4.0, 255.0, 255.0]), Some(1.0));
+    assert_eq!(small.constant([0.0; 3], [5.0; 3]), None);
+    assert_eq!(large.value([100.0; 3]), 1.0);
+}
+
+#[test]
+fn the_mixing_layer_ends_in_pure_fluids() {
+    let dims = [64, 48, 128];
+    let field = MixingLayer::new(dims);
+    let all = samples(&field, dims);
+    let layer = 64 * 48;
+    assert!(all[..32 * layer].iter().all(|v| *v == 0.0));
+    assert!(all[96 * layer..].iter().all(|v| *v == 255.0));
+    let mixed = &all[40 * layer..88 * layer];
+    let share =
+        mixed.iter().filter(|v| **v > 0.0 && **v < 255.0).count() as f64 / mixed.len() as f64;
+    assert!(share > 0.3, "share {share}");
+    for z in 0..32 {
+        let box_of = |z: u32| ([0.0, 0.0, f64::from(4 * z)], [63.0, 47.0, f64::from(4 * z + 3)]);
+        let (low, high) = box_of(z);
+        if let Some(value) = field.constant(low, high) {
+            let part = &all[4 * z as usize * layer..(4 * z as usize + 4) * layer];
+            assert!(part.iter().all(|v| f64::from(*v) == value), "z block {z}");
+        }
+    }
+}
+
+#[test]
+fn blocks_have_the_bits_of_single_values() {
+    for name in NAMES {
+        let field = by_name(name, DIMS).unwrap();
+        for origin in [[0, 0, 0], [12, 8, 24], [44, 36, 52]] {
+            let block = field.block(origin);
+            for (i, sample) in block.into_iter().enumerate() {
+                let offset = [i % 4, i / 4 % 4, i / 16];
+                let p = [0, 1, 2].map(|a| f64::from(origin[a]) + offset[a] as f64);
+                assert_eq!(sample.to_bits(), (field.value(p) as f32).to_bits(), "{name} {p:?}");
+            }
+        }
+    }
+}
+
+#[test]
 fn every_name_gives_its_field_and_another_name_lists_them() {
     for name in NAMES {
         let field = by_name(name, DIMS).unwrap();
@@ -181,10 +236,11 @@ fn every_name_gives_its_field_and_another_name_lists_them() {
 #[test]
 fn seeds_change_the_noise_and_nothing_else() {
     let p = [20.0, 11.0, 30.0];
-    let noisy: [fn(u32) -> Box<dyn Field>; 3] = [
+    let noisy: [fn(u32) -> Box<dyn Field>; 4] = [
         |seed| Box::new(Shells::with_seed(DIMS, seed)),
         |seed| Box::new(Turbulence::with_seed(DIMS, seed)),
         |seed| Box::new(RoughSolid::with_seed(DIMS, seed)),
+        |seed| Box::new(MixingLayer::with_seed(DIMS, seed)),
     ];
     for make in noisy {
         assert_eq!(make(1).value(p).to_bits(), make(1).value(p).to_bits());
@@ -221,7 +277,7 @@ fn samples_have_the_same_bits_on_every_platform() {
     assert_eq!(found, CHECKSUMS);
 }
 
-const CHECKSUMS: [(&str, u64); 7] = [
+const CHECKSUMS: [(&str, u64); 9] = [
     ("sphere", 0xf387_3c9f_0460_08c5),
     ("plane", 0x4712_0522_6624_8437),
     ("marschner-lobb", 0xc95b_6947_d5fb_ef6d),
@@ -229,4 +285,6 @@ const CHECKSUMS: [(&str, u64); 7] = [
     ("shells", 0x9a62_279d_3cda_ee9e),
     ("turbulence", 0x9bff_17da_2aa7_ed7e),
     ("rough-solid", 0xf6a1_73e7_58f7_150a),
+    ("patch", 0x9c8b_ed88_4b1e_a719),
+    ("mixing-layer", 0xbcca_73d8_9cc3_2896),
 ];
