@@ -1,6 +1,6 @@
 //! The few places where the benchmark depends on choices that the library offers.
 
-use progressive_iso::{FrameOptions, RendererOptions, ScenePlan};
+use progressive_iso::{FrameOptions, RendererOptions, Residency, ScenePlan};
 use serde::Serialize;
 
 /// Where a renderer shall keep its samples.
@@ -23,18 +23,30 @@ impl Wanted {
 }
 
 /// The options with the wanted residency.
-pub fn with_residency(options: RendererOptions, _wanted: Wanted) -> RendererOptions {
-    options
+pub fn with_residency(options: RendererOptions, wanted: Wanted) -> RendererOptions {
+    let residency = match wanted {
+        Wanted::Cached => Residency::Cached,
+        Wanted::Full => Residency::Full,
+    };
+    RendererOptions { residency, ..options }
 }
 
 /// What a plan has come to: a setting whose plan is another than it wanted is not measured.
-pub fn residency(_plan: &ScenePlan) -> Wanted {
-    Wanted::Cached
+pub fn residency(plan: &ScenePlan) -> Wanted {
+    match plan.residency() {
+        Residency::Full => Wanted::Full,
+        _ => Wanted::Cached,
+    }
 }
 
 /// A frame's options for `look_ahead`; a pass of `rounds` rounds.
 pub fn frame_options(look_ahead: u32, rounds: u32) -> FrameOptions {
-    FrameOptions { look_ahead, rounds_per_pass: rounds, ..Default::default() }
+    FrameOptions {
+        look_ahead,
+        rounds_per_pass: rounds,
+        pass_ms: f32::INFINITY,
+        ..Default::default()
+    }
 }
 
 /// Rounds per pass of a frame that continues one before it (state "moved"). One, so that rounds are
