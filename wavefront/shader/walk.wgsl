@@ -122,6 +122,7 @@ fn main(
     if (index >= rays[RAYS_LISTED]) {
         return;
     }
+    lru_begin_keeping();
     let id = rays[frame_list_word(frame, index)];
     let ray = frame_ray(frame, frame_pixel(frame, id)).ray;
     let state = rays[RAYS_HEADER + id];

@@ -23,21 +23,20 @@ fn lru_touch(slot: u32) {
     }
 }
 
-// Whether this invocation knows the clock already, and whether uses count.
-var<private> lru_clock_known: u32; // 0: not yet
+// Whether uses count for lru_keep in this invocation.
 var<private> lru_uses_count: bool;
 
-// Like lru_touch while slots are short. As long as a quarter of the slots has never been used, nothing will be
-// evicted in this round, and most caches stay that empty: what was used when does not matter.
+// To be called before lru_keep. As long as a quarter of the slots has never been used, nothing will be evicted in
+// this round, and most caches stay that empty: what was used when does not matter.
+fn lru_begin_keeping() {
+    let slots = lru_params().slots;
+    lru_uses_count = atomicLoad(&lru_state[LRU_NEXT_FREE]) + slots / 4u >= slots;
+}
+
+// Like lru_touch where slots are short.
 fn lru_keep(slot: u32) {
-    if (lru_clock_known == 0u) {
-        lru_clock_known = atomicLoad(&lru_state[LRU_CLOCK]);
-        let slots = lru_params().slots;
-        lru_uses_count = atomicLoad(&lru_state[LRU_NEXT_FREE]) + slots / 4u >= slots;
-    }
-    if (lru_uses_count && atomicLoad(&lru_state[lru_stamp_word(slot)]) != lru_clock_known
-        && atomicExchange(&lru_state[lru_stamp_word(slot)], lru_clock_known) != lru_clock_known) {
-        atomicAdd(&lru_state[LRU_USED_TOTAL], 1u);
+    if (lru_uses_count) {
+        lru_touch(slot);
     }
 }
 
