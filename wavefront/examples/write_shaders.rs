@@ -11,7 +11,7 @@ fn main() -> std::io::Result<()> {
         [("cached", SampleLayout::cached(3)), ("resident", SampleLayout::resident(4))]
     {
         sources.extend(Rays::sources(outputs, samples).map(|source| (name, source)));
-        sources.push((name, RunAhead::source(samples)));
+        sources.extend(RunAhead::sources(samples).into_iter().map(|source| (name, source)));
     }
     #[cfg(feature = "block-sorted")]
     sources.extend(wavefront::BlockSorted::sources(3).map(|source| ("cached", source)));

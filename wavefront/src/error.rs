@@ -39,6 +39,11 @@ pub enum Error {
     /// The strategy decodes blocks as rays need them.
     #[error("this strategy works with a cache only, not with a volume that is resident as a whole")]
     NeedsCache,
+    /// Pipelines for one kind of samples were given the other.
+    #[error(
+        "the pipelines were made for a cache and given a resident volume, or the other way round"
+    )]
+    OtherSamples,
     /// The start factor is out of range.
     #[error("the start factor is {found}, expected 1 to 8")]
     StartFactor {

@@ -19,6 +19,8 @@ const CELL: Module = Module { name: "cell", source: include_str!("../shader/lib/
 const BLOCK_WALK: Module =
     Module { name: "block_walk", source: include_str!("../shader/lib/block_walk.wgsl") };
 const LIST: Module = Module { name: "list", source: include_str!("../shader/list.wgsl") };
+const BLOCK_NEED: Module =
+    Module { name: "block_need", source: include_str!("../shader/lib/block_need.wgsl") };
 const START: Module = Module { name: "start", source: include_str!("../shader/start.wgsl") };
 const RESOLVE: Module = Module { name: "resolve", source: include_str!("../shader/resolve.wgsl") };
 
@@ -71,6 +73,7 @@ pub(crate) fn library(samples: SampleLayout) -> Vec<Module> {
     let mut modules = vec![
         FRAME,
         CELL,
+        BLOCK_NEED,
         BLOCK_WALK,
         samples.module(),
         OUTPUTS,

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use gpu_primitives::kernel::{Kernel, KernelSource};
+use gpu_primitives::kernel::{Binding, Kernel, KernelSource};
 use gpu_primitives::memory::Ledger;
 use gpu_primitives::wgpu;
 use gpu_primitives::wgsl::Module;
@@ -15,36 +15,58 @@ use crate::samples::{SampleLayout, Samples};
 use crate::strategy::{MakeResident, Rounds, Scene, Strategy};
 
 const WALK: Module = Module { name: "walk", source: include_str!("../shader/walk.wgsl") };
+const REQUEST: Module = Module { name: "request", source: include_str!("../shader/request.wgsl") };
 const WALK_RESIDENT: Module =
     Module { name: "walk_resident", source: include_str!("../shader/walk_resident.wgsl") };
 
-/// The strategy's kernel. Immutable; used with any number of pictures.
+/// The strategy's kernels. Immutable; used with any number of pictures.
 #[derive(Debug)]
 pub struct RunAhead {
     walk: Arc<Kernel>,
+    /// None where all samples are resident.
+    request: Option<Arc<Kernel>>,
 }
 
 /// The strategy allocates nothing.
 #[derive(Debug)]
 struct RunAheadRounds {
-    walk: Arc<Kernel>,
-    bind: wgpu::BindGroup,
+    walk: (Arc<Kernel>, wgpu::BindGroup),
+    request: Option<(Arc<Kernel>, wgpu::BindGroup)>,
 }
 
 impl RunAhead {
-    /// Makes the pipeline.
+    /// Makes the pipelines.
     pub fn new(device: &wgpu::Device, samples: SampleLayout) -> Self {
-        Self { walk: Arc::new(Self::source(samples).kernel(device)) }
+        let request = Self::request_source(samples);
+        Self {
+            walk: Arc::new(Self::walk_source(samples).kernel(device)),
+            request: request.map(|source| Arc::new(source.kernel(device))),
+        }
     }
 
-    /// Text and bindings of the kernel.
-    pub fn source(samples: SampleLayout) -> KernelSource {
-        // The directory and the cache's state.
-        let (module, tables) = if samples.resident { (WALK_RESIDENT, 0) } else { (WALK, 2) };
+    /// Texts and bindings of the kernels.
+    pub fn sources(samples: SampleLayout) -> Vec<KernelSource> {
+        [Self::walk_source(samples)].into_iter().chain(Self::request_source(samples)).collect()
+    }
+
+    fn walk_source(samples: SampleLayout) -> KernelSource {
+        let module = if samples.resident { WALK_RESIDENT } else { WALK };
         let mut bindings = vec![FRAME_PARAMS, RAYS, MASKS];
-        bindings.extend(vec![WRITE; tables]);
+        bindings.extend(Self::tables(samples));
         bindings.extend(vec![SLOTS; samples.pages as usize]);
         source("wavefront.walk", module, bindings, samples, &[], None)
+    }
+
+    fn request_source(samples: SampleLayout) -> Option<KernelSource> {
+        let mut bindings = vec![FRAME_PARAMS, RAYS, MASKS];
+        bindings.extend(Self::tables(samples));
+        let source = || source("wavefront.request", REQUEST, bindings, samples, &[], None);
+        (!samples.resident).then(source)
+    }
+
+    /// The cache's directory and state.
+    fn tables(samples: SampleLayout) -> Vec<Binding> {
+        if samples.resident { Vec::new() } else { vec![WRITE, WRITE] }
     }
 }
 
@@ -56,20 +78,29 @@ impl Strategy for RunAhead {
         scene: Scene<'_>,
     ) -> Result<Box<dyn Rounds>, Error> {
         let Scene { rays, masks, samples } = scene;
-        let mut bindings = resources(&[rays.frame(), rays.rays(), masks]);
-        if let Samples::Cached(cache) = samples {
-            bindings.extend(resources(&[cache.directory(), cache.state()]));
+        let mut request = resources(&[rays.frame(), rays.rays(), masks]);
+        match (samples, &self.request) {
+            (Samples::Cached(cache), Some(_)) => {
+                request.extend(resources(&[cache.directory(), cache.state()]));
+            }
+            (Samples::Resident(_), None) => {}
+            _ => return Err(Error::OtherSamples),
         }
-        bindings.extend(samples.slots().iter().map(|page| page.as_entire_binding()));
-        let bind = self.walk.bind(device, "wavefront.walk", &bindings);
-        Ok(Box::new(RunAheadRounds { walk: Arc::clone(&self.walk), bind }))
+        let mut walk = request.clone();
+        walk.extend(samples.slots().iter().map(|page| page.as_entire_binding()));
+        let bind = self.walk.bind(device, "wavefront.walk", &walk);
+        let request = self
+            .request
+            .as_ref()
+            .map(|kernel| (Arc::clone(kernel), kernel.bind(device, "wavefront.request", &request)));
+        Ok(Box::new(RunAheadRounds { walk: (Arc::clone(&self.walk), bind), request }))
     }
 }
 
 impl Rounds for RunAheadRounds {
     fn record_start(&self, _: &mut wgpu::CommandEncoder, _: &Rays, _: &RayBuffers) {}
 
-    /// A walk of the active rays, the shading of new hits, then what serves the requests.
+    /// A walk of the active rays, the shading of new hits, then requests and what serves them.
     fn record_round(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -80,9 +111,15 @@ impl Rounds for RunAheadRounds {
         {
             let _span = tracing::trace_span!("wavefront.walk").entered();
             let mut pass = begin(encoder, "wavefront.walk");
-            self.walk.dispatch_indirect(&mut pass, &self.bind, rays.args(), 0);
+            let (kernel, bind) = &self.walk;
+            kernel.dispatch_indirect(&mut pass, bind, rays.args(), 0);
         }
         stage.record_resolve(encoder, rays);
+        if let Some((kernel, bind)) = &self.request {
+            let _span = tracing::trace_span!("wavefront.request").entered();
+            let mut pass = begin(encoder, "wavefront.request");
+            kernel.dispatch_indirect(&mut pass, bind, rays.args(), 0);
+        }
         make_resident(encoder);
     }
 

@@ -30,7 +30,7 @@ fn kernels_validate_with_every_set_of_outputs_and_pages() {
         for pages in 1..=4 {
             for samples in [SampleLayout::cached(pages), SampleLayout::resident(pages)] {
                 Rays::sources(outputs, samples).iter().for_each(check);
-                check(&RunAhead::source(samples));
+                RunAhead::sources(samples).iter().for_each(check);
             }
         }
     }

@@ -3,6 +3,7 @@
 // block itself, bit n its plus-side neighbour n = x + 2y + 4z)
 // and fn block_sample(x: i32, y: i32, z: i32) -> f32, the sample at 0 ..= 4 on each axis from the block's first.
 #import cell
+#import block_need
 
 // Where a ray stands inside a block: `cell` was reached by `event`.
 struct CellPlace {
@@ -20,31 +21,6 @@ struct BlockWalk {
     bernstein: vec4<f32>,
     bracket: CellBracket,
     inside_low: bool,
-}
-
-// Blocks that a dual cell's samples lie in.
-fn block_cell_need(cell: vec3<i32>) -> u32 {
-    let upper = (cell & vec3<i32>(3)) == vec3<i32>(3);
-    var need = 1u;
-    need |= select(0u, need << 1u, upper.x);
-    need |= select(0u, need << 2u, upper.y);
-    need |= select(0u, need << 4u, upper.z);
-    return need;
-}
-
-// Blocks that the samples lie in of all cells that the ray visits in `box` from `start` on.
-fn block_need(ray: DdaRay, start: vec3<i32>, box: DdaBox) -> u32 {
-    var need = 0u;
-    var cell = start;
-    while (all(cell >= box.low) && all(cell <= box.high)) {
-        need |= block_cell_need(cell);
-        cell = block_next(ray, cell, dda_cell_exit(ray, cell));
-    }
-    return need;
-}
-
-fn block_next(ray: DdaRay, cell: vec3<i32>, exit: DdaEvent) -> vec3<i32> {
-    return cell + dda_step_on(exit.axis, ray.step);
 }
 
 fn block_corners(cell: vec3<i32>, isovalue: f32) -> CellCorners {
