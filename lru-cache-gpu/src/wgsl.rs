@@ -14,7 +14,11 @@ pub const DIRECTORY: Module =
 pub const STATE: Module =
     Module { name: "lru_state", source: include_str!("../shader/lib/lru_state.wgsl") };
 
-/// Looking up, touching, requesting and leading; imports [`STATE`].
+/// Marking slots as used; imports [`STATE`].
+pub const KEEP: Module =
+    Module { name: "lru_keep", source: include_str!("../shader/lib/lru_keep.wgsl") };
+
+/// Looking up, requesting and leading; imports [`KEEP`].
 pub const REQUEST: Module =
     Module { name: "lru_request", source: include_str!("../shader/lib/lru_request.wgsl") };
 
@@ -31,7 +35,7 @@ pub(crate) const SERVICE: Module =
     Module { name: "lru_service", source: include_str!("../shader/lib/lru_service.wgsl") };
 
 /// Everything a walking kernel needs to import from this crate.
-pub const MODULES: [Module; 6] = [PARAMS, DIRECTORY, STATE, REQUEST, LOOKUP, SLOTS];
+pub const MODULES: [Module; 7] = [PARAMS, DIRECTORY, STATE, KEEP, REQUEST, LOOKUP, SLOTS];
 
 /// Constants that fit [`SLOTS`] to a number of slot pages.
 pub fn page_constants(pages: u32) -> [(&'static str, Constant); 3] {

@@ -3,14 +3,15 @@
 #import frame
 #import indirect
 #import macrocell_skip
-#import lru_request
+#import lru_keep
+#import lru_lookup
 #import block_samples
 #import block_walk
 
 @group(0) @binding(0) var<uniform> frame: FrameParams;
 @group(0) @binding(1) var<storage, read_write> rays: array<u32>;
 @group(0) @binding(2) var<storage, read> masks: array<vec2<u32>>;
-@group(0) @binding(3) var<storage, read_write> lru_directory: array<atomic<u32>>;
+@group(0) @binding(3) var<storage, read> lru_directory: array<u32>;
 @group(0) @binding(4) var<storage, read_write> lru_state: array<atomic<u32>>;
 @group(0) @binding(5) var<storage, read> lru_slots_0: array<f32>;
 #ifdef LRU_PAGES_2

@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
-use gpu_primitives::kernel::{Binding, Kernel, KernelSource};
+use gpu_primitives::kernel::{Kernel, KernelSource};
 use gpu_primitives::memory::Ledger;
 use gpu_primitives::wgpu;
 use gpu_primitives::wgsl::Module;
 
 use crate::Error;
 use crate::rays::{
-    FRAME_PARAMS, MASKS, RAYS, RayBuffers, Rays, SLOTS, WRITE, begin, resources, source,
+    FRAME_PARAMS, MASKS, RAYS, READ, RayBuffers, Rays, SLOTS, WRITE, begin, resources, source,
 };
 use crate::samples::{SampleLayout, Samples};
 use crate::strategy::{MakeResident, Rounds, Scene, Strategy};
@@ -52,21 +52,16 @@ impl RunAhead {
     fn walk_source(samples: SampleLayout) -> KernelSource {
         let module = if samples.resident { WALK_RESIDENT } else { WALK };
         let mut bindings = vec![FRAME_PARAMS, RAYS, MASKS];
-        bindings.extend(Self::tables(samples));
+        // The cache's directory and state.
+        bindings.extend(if samples.resident { vec![] } else { vec![READ, WRITE] });
         bindings.extend(vec![SLOTS; samples.pages as usize]);
         source("wavefront.walk", module, bindings, samples, &[], None)
     }
 
     fn request_source(samples: SampleLayout) -> Option<KernelSource> {
-        let mut bindings = vec![FRAME_PARAMS, RAYS, MASKS];
-        bindings.extend(Self::tables(samples));
+        let bindings = vec![FRAME_PARAMS, RAYS, MASKS, WRITE, WRITE];
         let source = || source("wavefront.request", REQUEST, bindings, samples, &[], None);
         (!samples.resident).then(source)
-    }
-
-    /// The cache's directory and state.
-    fn tables(samples: SampleLayout) -> Vec<Binding> {
-        if samples.resident { Vec::new() } else { vec![WRITE, WRITE] }
     }
 }
 
