@@ -84,7 +84,7 @@ fn bars(rows: &[Row], state: &str, title: &str) -> Bars {
             settings.push(setting);
         }
     }
-    settings.sort_by_key(|setting| (setting.starts_with("Block"), setting.starts_with("CPU")));
+    settings.sort_by_key(|setting| (setting.starts_with("CPU"), setting.starts_with("Block")));
     let time = |setting: &str, wanted: &str| {
         let mut found = rows.iter().filter(|row| row.key.setting == setting);
         found.find(|row| group(&row.key.volume, row.key.size) == wanted).map(|row| row.ms_100)

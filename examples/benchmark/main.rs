@@ -23,6 +23,7 @@ mod rows;
 mod scaling;
 mod scene;
 mod sets;
+mod summary;
 #[path = "../support/mod.rs"]
 mod support;
 mod tables;

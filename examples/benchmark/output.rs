@@ -10,6 +10,7 @@ use crate::frame::FrameRow;
 use crate::measure::{Results, Skipped};
 use crate::rows::{Row, medians};
 use crate::scaling::Ratio;
+use crate::summary::Summary;
 use crate::support::{Failure, write_file};
 use crate::{figures, tables};
 
@@ -34,6 +35,7 @@ impl Origin {
 struct File<'a> {
     #[serde(flatten)]
     origin: &'a Origin,
+    summary: &'a Summary,
     rows: &'a [Row],
     skipped: &'a [Skipped],
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
@@ -44,11 +46,13 @@ struct File<'a> {
 /// Writes everything, and the tables to the terminal.
 pub fn write(folder: &Path, origin: &Origin, results: &Results) -> Result<(), Failure> {
     let rows = medians(&results.frames);
-    let text = tables::all(origin, &rows, results);
+    let summary = Summary::new(&rows, &results.frames);
+    let text = tables::all(origin, &summary, &rows, results);
     println!("\n{text}");
     write_file(&folder.join("benchmark.md"), text.as_bytes())?;
     let Results { frames, skipped, scaling } = results;
-    write_json(folder, "benchmark.json", &File { origin, rows: &rows, skipped, scaling, frames })?;
+    let file = File { origin, summary: &summary, rows: &rows, skipped, scaling, frames };
+    write_json(folder, "benchmark.json", &file)?;
     figures::write(folder, &rows, frames)
 }
 

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 const WIDTH: f64 = 1100.0;
-const HEIGHT: f64 = 480.0;
+const HEIGHT: f64 = 520.0;
 /// Left, top, right and bottom of the area inside the axes; the legend is on its right.
 const AREA: [f64; 4] = [76.0, 44.0, 810.0, 420.0];
 

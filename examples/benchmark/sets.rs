@@ -84,8 +84,9 @@ impl Setting {
 }
 
 pub fn run_ahead(look_ahead: u32) -> Setting {
+    let mark = if look_ahead == default_look_ahead() { " (default)" } else { "" };
     Setting {
-        label: format!("RunAhead, look-ahead {look_ahead}"),
+        label: format!("RunAhead, look-ahead {look_ahead}{mark}"),
         strategy: TraversalStrategy::RunAhead,
         start_factor: 0,
         look_ahead,

@@ -6,6 +6,7 @@ use crate::measure::{Results, Skipped};
 use crate::output::Origin;
 use crate::rows::Row;
 use crate::scaling::Ratio;
+use crate::summary::{Share, Summary};
 
 /// A Markdown table; the first `text` columns are aligned to the left.
 pub struct Table {
@@ -67,13 +68,15 @@ fn other<'a>(rows: &'a [Row], row: &Row, state: &str) -> Option<&'a Row> {
     })
 }
 
-pub fn all(origin: &Origin, rows: &[Row], results: &Results) -> String {
+pub fn all(origin: &Origin, summary: &Summary, rows: &[Row], results: &Results) -> String {
     let Origin { adapter, commit, date, command } = origin;
     let mut text = format!(
         "`benchmark {command}`, {adapter}, commit {commit}, {date}. Medians over the views; \
          percentages count all pixels.\n\n"
     );
     text += &scaling(&results.scaling);
+    text += &comparisons(summary);
+    text += &shares(summary);
     text += &strategies(rows);
     text += &moved(rows);
     text += &needed(rows);
@@ -99,6 +102,64 @@ fn scaling(ratios: &[Ratio]) -> String {
             format!("{ms_largest:.0}"),
             format!("{ratio:.2}"),
         ]);
+    }
+    table.finish()
+}
+
+fn comparisons(summary: &Summary) -> String {
+    let heads = [
+        "volume",
+        "picture",
+        "RunAhead, ms to 85 %",
+        "BlockSorted",
+        "faster",
+        "RunAhead, ms to 100 %",
+        "BlockSorted",
+        "faster",
+    ];
+    let mut table =
+        Table::new("RunAhead against BlockSorted, cold, best setting of each", &heads, 2);
+    for c in &summary.comparisons {
+        table.line(&[
+            c.volume.clone(),
+            format!("{}x{}", c.size[0], c.size[1]),
+            format!("{:.0}", c.run_ahead_ms_85),
+            format!("{:.0}", c.block_sorted_ms_85),
+            format!("{:.2}", c.faster_85),
+            format!("{:.0}", c.run_ahead_ms_100),
+            format!("{:.0}", c.block_sorted_ms_100),
+            format!("{:.2}", c.faster_100),
+        ]);
+    }
+    if !summary.comparisons.is_empty() {
+        let [faster_85, faster_100] =
+            [summary.faster_85, summary.faster_100].map(|faster| format!("{faster:.2}"));
+        let empty = String::new;
+        table.line(&[
+            "median".into(),
+            empty(),
+            empty(),
+            empty(),
+            faster_85,
+            empty(),
+            empty(),
+            faster_100,
+        ]);
+    }
+    table.finish()
+}
+
+fn shares(summary: &Summary) -> String {
+    let mut table = Table::new("Frames of RunAhead", &["what", "frames", "of", "share"], 1);
+    for (what, Share { frames, of }) in [
+        ("warm, in one round without a decode", summary.warm_in_one_round),
+        ("moved, in at most three rounds", summary.moved_in_three_rounds),
+        ("moved, in one pass", summary.moved_in_one_pass),
+    ] {
+        if of > 0 {
+            let share = format!("{:.1} %", 100.0 * frames as f64 / of as f64);
+            table.line(&[what.into(), frames.to_string(), of.to_string(), share]);
+        }
     }
     table.finish()
 }
