@@ -193,6 +193,7 @@ fn check(gpu: &Gpu, case: &Case) -> Result<(), String> {
     }
     play(gpu, &mut renderer, scene, size, &case.history);
     frame.options.rounds_per_pass = case.rounds_per_pass;
+    frame.options.pass_ms = f32::INFINITY;
     frame.options.look_ahead = case.look_ahead;
     renderer.set_frame(&frame).unwrap();
     let mut passes = 0;

@@ -10,6 +10,7 @@ use macrocell::cpu::skip::{self, Masks};
 use progressive_iso::{
     BlockSortedOptions, FrameView, ProgressiveIsoRenderer, RendererOptions, TraversalStrategy,
 };
+use wavefront::LookAhead;
 use wavefront::cpu::block_walk::{BlockWalk, block_walk};
 use wavefront::cpu::frame::FrameRay;
 
@@ -131,7 +132,7 @@ fn ways(scene: &Scene, size: [u32; 2]) -> Vec<Way> {
     let lru = lru_params(scene, size);
     let camera = scene.orbit(35.0, 20.0, size);
     let view = FrameView::new(&camera, size, scene.world_from_index, dims).unwrap();
-    let params = view.params(grid, lru, scene.isovalue, 1);
+    let params = view.params(grid, lru, scene.isovalue, LookAhead::NONE);
     let sample = |v: [i32; 3]| {
         let [x, y, z] = v.map(|c| c as usize);
         samples[x + dims[0] as usize * (y + dims[1] as usize * z)]

@@ -144,7 +144,9 @@ pub(crate) fn shading() -> Shading {
 }
 
 pub(crate) fn frame(camera: Camera, isovalue: f32) -> Frame {
-    let options = FrameOptions { shading: shading(), ..FrameOptions::default() };
+    // A round in every pass, so that passes count rounds.
+    let options =
+        FrameOptions { shading: shading(), rounds_per_pass: 1, ..FrameOptions::default() };
     Frame { camera, isovalues: vec![isovalue], options }
 }
 

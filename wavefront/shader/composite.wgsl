@@ -27,7 +27,9 @@ fn main(
         let status = pair & PAIR_STATUS;
         if (status != PAIR_READY) {
             let state = select(RAY_ACTIVE, RAY_HIT, status == PAIR_HIT);
-            rays[RAYS_HEADER + rays[frame_list_word(frame, index)]] = state | frame_pack(frame, frame_block_position(frame, pair & PAIR_BLOCK));
+            let id = rays[frame_list_word(frame, index)];
+            let block = frame_block_position(frame, pair & PAIR_BLOCK);
+            rays[RAYS_HEADER + id] = state | frame_pack(frame, block);
             return;
         }
     }

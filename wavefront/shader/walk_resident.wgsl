@@ -38,7 +38,7 @@ fn walk(grid: MacrocellGrid, ray: DdaRay, first_block: vec3<i32>) -> u32 {
         let start = CellPlace(place.event, macrocell_first_cell(grid, ray, place));
         let result = block_walk(ray, start, box, frame.isovalue, 0u);
         if (result.hit) {
-            return RAY_HIT | macrocell_linear(place.block, frame.grid.blocks);
+            return RAY_HIT | frame_pack_count(frame, result.cells) | frame_pack(frame, place.block);
         }
         place = macrocell_advance(
             grid, ray, macrocell_step(ray, place.block, result.place.event));
