@@ -26,3 +26,4 @@ pub use wavefront::{
     Camera, DEPTH_NONE, DrawTarget, FrameView, Light, OutputTextures, Outputs, PixelStatus, Shading,
 };
 pub use wgpu;
+pub use zfp_gpu::StreamLayout;

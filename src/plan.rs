@@ -5,7 +5,7 @@ use gpu_primitives::readback::ReadbackRing;
 use lru_cache_gpu::{CachePlan, ResidentPlan};
 use macrocell::{MacrocellPlan, Masks, RangeScratch};
 use wavefront::{DrawBuffers, WavefrontPlan};
-use zfp_gpu::{DecodeBuffers, ExtremaBuffers, PayloadPlan};
+use zfp_gpu::{DecodeBuffers, ExtremaBuffers, PayloadPlan, StreamLayout};
 
 use crate::load::LoadPlan;
 use crate::renderer::READBACK_BYTES;
@@ -54,16 +54,28 @@ impl ScenePlan {
     /// Plans a scene.
     ///
     /// # Errors
-    /// If the volume or picture exceeds the device's limits, or the budget is below the minimum,
-    /// which the error names.
+    /// As [`ScenePlan::for_layout`].
     pub fn new(
         volume: &CompressedVolume,
         options: &RendererOptions,
         limits: &wgpu::Limits,
     ) -> Result<Self, Error> {
+        Self::for_layout(volume.layout(), options, limits)
+    }
+
+    /// Plans a scene before its stream is at hand.
+    ///
+    /// # Errors
+    /// If the volume or picture exceeds the device's limits, or the budget is below the minimum,
+    /// which the error names.
+    pub fn for_layout(
+        layout: &StreamLayout,
+        options: &RendererOptions,
+        limits: &wgpu::Limits,
+    ) -> Result<Self, Error> {
         check_limits(limits)?;
-        let payload = PayloadPlan::new(volume.layout(), limits)?;
-        let macrocell = MacrocellPlan::new(volume.dims(), limits)?;
+        let payload = PayloadPlan::new(layout, limits)?;
+        let macrocell = MacrocellPlan::new(layout.dims, limits)?;
         let outputs = options.all_outputs();
         let wavefront = WavefrontPlan::new(options.size, outputs, limits)?;
         let strategy = StrategyPlan::new(options.strategy, wavefront.rays(), limits)?;

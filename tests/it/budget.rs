@@ -1,8 +1,11 @@
 //! Memory: never more than planned, never more than allowed, nothing for what is left out.
 
 use progressive_iso::{
-    Category, DrawTarget, Error, Outputs, ProgressiveIsoRenderer, RendererOptions, ScenePlan, wgpu,
+    Category, DrawTarget, Error, Outputs, ProgressiveIsoRenderer, RendererOptions, ScenePlan,
+    StreamLayout, wgpu,
 };
+
+use volume_io::ZfpVolume;
 
 use crate::invariance::{minimum_budget, same_picture};
 use crate::support::{Gpu, Scene, options};
@@ -56,6 +59,15 @@ fn what_is_allocated_stays_within_the_plan_and_the_plan_within_the_budget() {
             assert_eq!(sum, report.bytes);
         }
     }
+}
+
+#[test]
+fn plans_need_no_stream() {
+    let scene = Scene::generated("gyroid", [21, 13, 9], 8.0);
+    let (options, limits) = (options([64, 48]), wgpu::Limits::default());
+    let ZfpVolume { dims, bits_per_block, first_bit, .. } = scene.volume;
+    let layout = StreamLayout::new(dims, bits_per_block, first_bit).unwrap();
+    assert_eq!(ScenePlan::for_layout(&layout, &options, &limits), plan(&scene, &options));
 }
 
 /// Not only for small volumes: staging, which grows with the budget, must not move the minimum.
