@@ -5,11 +5,13 @@ mod error;
 mod load;
 mod options;
 mod plan;
+mod records;
 mod renderer;
 mod report;
 mod samples;
 mod schedule;
 mod stages;
+mod strategy;
 mod timing;
 mod volume;
 
@@ -17,7 +19,7 @@ pub use capture::{Capture, PendingCapture};
 pub use error::Error;
 pub use gpu_primitives::memory::Category;
 pub use options::{Frame, FrameOptions, RendererOptions, Residency, TraversalStrategy};
-pub use plan::{Part, ScenePlan};
+pub use plan::{Part, ScenePlan, When};
 pub use renderer::ProgressiveIsoRenderer;
 pub use report::PassReport;
 pub use volume::{CompressedVolume, StreamBytes};
@@ -27,3 +29,4 @@ pub use wavefront::{
     Camera, DEPTH_NONE, DrawTarget, FrameView, Light, OutputTextures, Outputs, PixelStatus, Shading,
 };
 pub use wgpu;
+pub use zfp_gpu::StreamLayout;

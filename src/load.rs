@@ -2,14 +2,20 @@
 
 use gpu_primitives::memory::Ledger;
 use gpu_primitives::upload::UploadRing;
-use macrocell::{MacrocellPlan, RangeBuffers, RangeScratch, Ranges};
-use zfp_gpu::{BlockExtrema, ExtremaBuffers, KeptSamples, Payload};
+use macrocell::{RangeScratch, Ranges};
+use zfp_gpu::{BlockExtrema, ExtremaBuffers};
 
-use crate::{CompressedVolume, Error, wgpu};
+use crate::samples::{SampleBuffers, SamplePlan};
+use crate::stages::VolumeBuffers;
+use crate::{CompressedVolume, Error, ScenePlan, wgpu};
 
 /// Largest upload chunk, and the stream's bytes per pass.
 const MOST_CHUNK: u64 = 8 << 20;
 const LEAST_CHUNK: u64 = 64 << 10;
+
+/// Chunks that are staged at a time: two passes are in flight, and a chunk may be split at a page's
+/// border.
+const CHUNKS: u64 = 4;
 
 /// Regions of value ranges per pass: at most 4 * 33^3 blocks are decoded, so that no driver's
 /// watchdog fires.
@@ -22,26 +28,21 @@ pub(crate) struct LoadPlan {
 }
 
 impl LoadPlan {
-    /// Chunks of a 64th of the budget, so that staging takes a 16th at most.
-    pub(crate) fn new(stream_bytes: u64, budget_bytes: u64) -> Self {
-        let affordable = (budget_bytes / 64).clamp(LEAST_CHUNK, MOST_CHUNK);
+    /// The largest useful chunks that fit `room` bytes together, or else the smallest ones.
+    pub(crate) fn new(stream_bytes: u64, room: u64) -> Self {
+        let affordable = (room / CHUNKS).clamp(LEAST_CHUNK, MOST_CHUNK);
         let useful = stream_bytes.next_power_of_two().max(LEAST_CHUNK);
         let rounded_down = 1 << affordable.ilog2();
         Self { chunk: useful.min(rounded_down) }
     }
 
-    /// The smallest chunks.
-    pub(crate) fn smallest(stream_bytes: u64) -> Self {
-        Self::new(stream_bytes, 0)
-    }
-
-    /// Two passes are in flight, and a chunk may be split at a page's border.
+    /// Most bytes that are staged at a time.
     pub(crate) fn staging_bytes(self) -> u64 {
-        4 * self.chunk
+        CHUNKS * self.chunk
     }
 }
 
-/// What loading needs; dropped when it is done.
+/// What loading needs; dropped when the GPU is done with it.
 #[derive(Debug)]
 pub(crate) struct Loader {
     upload: UploadRing,
@@ -50,6 +51,8 @@ pub(crate) struct Loader {
     extrema_stage: BlockExtrema,
     scratch: RangeScratch,
     extrema: ExtremaBuffers,
+    /// Memory of the samples where all are kept.
+    samples: Option<SampleBuffers>,
     next_byte: u64,
     next_region: u64,
 }
@@ -58,46 +61,68 @@ impl Loader {
     pub(crate) fn new(
         device: &wgpu::Device,
         ledger: &Ledger,
-        plan: LoadPlan,
-        payload: &Payload,
-        ranges: &RangeBuffers,
-        kept: Option<KeptSamples<'_>>,
+        plan: &ScenePlan,
+        buffers: &VolumeBuffers,
     ) -> Result<Self, Error> {
+        let VolumeBuffers { payload, ranges, .. } = buffers;
+        let samples = match &plan.samples {
+            SamplePlan::Cached(_) => None,
+            SamplePlan::Resident(plan) => Some(SampleBuffers::resident(device, ledger, plan)),
+        };
+        let kept = samples.as_ref().and_then(SampleBuffers::kept);
         let kept_pages = kept.map_or(0, |kept| kept.pages.len() as u32);
         let range_stage = Ranges::new(device);
         let extrema_stage = BlockExtrema::new(device, kept_pages)?;
         let scratch = RangeScratch::new(device, ledger, &range_stage, ranges);
         let extrema =
             ExtremaBuffers::new(device, ledger, &extrema_stage, payload, scratch.extrema(), kept)?;
+        let chunk = plan.load.chunk;
         Ok(Self {
-            upload: UploadRing::new(ledger, "progressive-iso.load.upload", plan.chunk),
-            chunk: plan.chunk,
+            upload: UploadRing::new(ledger, "progressive-iso.load.upload", chunk),
+            chunk,
             range_stage,
             extrema_stage,
             scratch,
             extrema,
+            samples,
             next_byte: 0,
             next_region: 0,
         })
     }
 
-    /// Share of the work that is recorded, 0 to 1.
-    pub(crate) fn share(&self, volume: &CompressedVolume, plan: &MacrocellPlan) -> f32 {
-        let bytes = self.next_byte as f64 / volume.layout().stream_bytes().max(1) as f64;
-        let regions = self.next_region as f64 / plan.region_count().max(1) as f64;
-        ((bytes + regions) / 2.0) as f32
+    /// Whether everything is recorded.
+    pub(crate) fn is_recorded(&self, buffers: &VolumeBuffers) -> bool {
+        self.next_region == buffers.ranges.plan().region_count()
     }
 
-    /// Records the next piece; true when everything is recorded.
+    /// Whether no submission uses its staging memory.
+    pub(crate) fn is_idle(&self) -> bool {
+        self.upload.is_idle()
+    }
+
+    /// The samples, if they were kept; frees everything else.
+    pub(crate) fn into_samples(self) -> Option<SampleBuffers> {
+        self.samples
+    }
+
+    /// Share of the work that is recorded, 0 to 1.
+    pub(crate) fn share(&self, buffers: &VolumeBuffers) -> f32 {
+        let bytes = buffers.payload.layout().stream_bytes().max(1);
+        let regions = buffers.ranges.plan().region_count().max(1);
+        let share = |done: u64, all: u64| done as f64 / all as f64;
+        ((share(self.next_byte, bytes) + share(self.next_region, regions)) / 2.0) as f32
+    }
+
+    /// Records the next piece.
     pub(crate) fn record(
         &mut self,
         device: &wgpu::Device,
         encoder: &mut wgpu::CommandEncoder,
         params: &mut UploadRing,
         volume: &CompressedVolume,
-        payload: &mut Payload,
-        ranges: &RangeBuffers,
-    ) -> Result<bool, Error> {
+        buffers: &mut VolumeBuffers,
+    ) -> Result<(), Error> {
+        let VolumeBuffers { payload, ranges, .. } = buffers;
         let length = volume.layout().stream_bytes();
         if self.next_byte < length {
             let end = (self.next_byte + self.chunk).min(length);
@@ -105,7 +130,7 @@ impl Loader {
             payload.record_upload(device, encoder, &mut self.upload, self.next_byte, piece)?;
             self.next_byte = end;
             if end < length {
-                return Ok(false);
+                return Ok(());
             }
         }
         let count = ranges.plan().region_count();
@@ -122,6 +147,6 @@ impl Loader {
             self.range_stage.record(device, encoder, params, ranges, &self.scratch, region);
             self.next_region += 1;
         }
-        Ok(self.next_region == count)
+        Ok(())
     }
 }

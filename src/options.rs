@@ -46,6 +46,9 @@ pub struct RendererOptions {
     pub strategy: TraversalStrategy,
     /// What is kept of the decoded volume.
     pub residency: Residency,
+    /// Most blocks that are decoded at a time, if the budget holds more; at least 8 where the volume
+    /// has as many. [`Residency::Auto`] caches volumes of more blocks, [`Residency::Full`] ignores it.
+    pub most_slots: Option<u64>,
 }
 
 impl Default for RendererOptions {
@@ -59,6 +62,7 @@ impl Default for RendererOptions {
             capture: false,
             strategy: TraversalStrategy::RunAhead,
             residency: Residency::Auto,
+            most_slots: None,
         }
     }
 }

@@ -1,21 +1,19 @@
 //! The plan: what a scene needs, part by part, before anything is allocated.
 
+use std::fmt;
+
 use gpu_primitives::memory::Ledger;
 use gpu_primitives::readback::ReadbackRing;
-use lru_cache_gpu::{CachePlan, ResidentPlan};
+use lru_cache_gpu::{CachePlan, CacheRoom, ResidentPlan};
 use macrocell::{MacrocellPlan, Masks, RangeScratch};
 use wavefront::{DrawBuffers, WavefrontPlan};
-use zfp_gpu::{DecodeBuffers, ExtremaBuffers, PayloadPlan};
+use zfp_gpu::{DecodeBuffers, ExtremaBuffers, PayloadPlan, StreamLayout};
 
 use crate::load::LoadPlan;
-use crate::renderer::READBACK_BYTES;
+use crate::records::{CONTROL_BYTES, PASSES_IN_FLIGHT, READBACK_BYTES};
 use crate::samples::SamplePlan;
-use crate::{
-    CompressedVolume, Error, RendererOptions, Residency, TraversalStrategy, capture, wgpu,
-};
-
-/// Passes that may be in flight.
-pub(crate) const PASSES_IN_FLIGHT: usize = 2;
+use crate::strategy::StrategyPlan;
+use crate::{CompressedVolume, Error, RendererOptions, Residency, capture, wgpu};
 
 /// Largest upload chunk of a frame's parameters.
 pub(crate) const PARAMS_CHUNK: u64 = 1024;
@@ -23,12 +21,26 @@ pub(crate) const PARAMS_CHUNK: u64 = 1024;
 /// Staging memory of parameters: chunks of at most [`PARAMS_CHUNK`] bytes, two passes in flight.
 const PARAMS_STAGING: u64 = 128 << 10;
 
+/// When a part of a scene has its memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
+pub enum When {
+    /// As long as the renderer lives.
+    Always,
+    /// Until the GPU has loaded the volume.
+    Loading,
+    /// From then on.
+    Rendering,
+}
+
 /// One part of a scene.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Part {
     /// What it is.
     pub name: &'static str,
+    /// When its memory is allocated.
+    pub when: When,
     /// Bytes of GPU memory; 0 for a part that is left out.
     pub bytes: u64,
     /// Why it is in or left out.
@@ -37,7 +49,7 @@ pub struct Part {
     pub included: bool,
 }
 
-/// What a scene needs, computed from the volume, the options and the device's limits alone.
+/// What a scene needs, computed from the volume's layout, the options and the device's limits alone.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScenePlan {
     pub(crate) payload: PayloadPlan,
@@ -54,50 +66,80 @@ impl ScenePlan {
     /// Plans a scene.
     ///
     /// # Errors
-    /// If the volume or picture exceeds the device's limits, or the budget is below the minimum,
-    /// which the error names.
+    /// As [`ScenePlan::for_layout`].
     pub fn new(
         volume: &CompressedVolume,
         options: &RendererOptions,
         limits: &wgpu::Limits,
     ) -> Result<Self, Error> {
+        Self::for_layout(volume.layout(), options, limits)
+    }
+
+    /// Plans a scene before its stream is at hand.
+    ///
+    /// # Errors
+    /// If the volume or picture exceeds the device's limits, or the budget is below the minimum,
+    /// which the error names.
+    pub fn for_layout(
+        layout: &StreamLayout,
+        options: &RendererOptions,
+        limits: &wgpu::Limits,
+    ) -> Result<Self, Error> {
+        Self::with_load(layout, options, limits, None)
+    }
+
+    /// Plans a scene whose volume is being loaded with `load` already, if that is given.
+    pub(crate) fn with_load(
+        layout: &StreamLayout,
+        options: &RendererOptions,
+        limits: &wgpu::Limits,
+        load: Option<LoadPlan>,
+    ) -> Result<Self, Error> {
         check_limits(limits)?;
-        let payload = PayloadPlan::new(volume.layout(), limits)?;
-        let macrocell = MacrocellPlan::new(volume.dims(), limits)?;
+        let payload = PayloadPlan::new(layout, limits)?;
+        let macrocell = MacrocellPlan::new(layout.dims, limits)?;
         let outputs = options.all_outputs();
         let wavefront = WavefrontPlan::new(options.size, outputs, limits)?;
         let strategy = StrategyPlan::new(options.strategy, wavefront.rays(), limits)?;
-        let scene = Scene { options, payload, macrocell, wavefront, strategy, limits };
+        let scene = Scene { options, limits, payload, macrocell, load, wavefront, strategy };
         match options.residency {
             Residency::Cached => scene.cached(),
             Residency::Full => scene.resident(),
-            Residency::Auto if strategy.can_be_resident() => {
+            Residency::Auto if scene.may_be_resident() => {
                 scene.resident().or_else(|_| scene.cached())
             }
             Residency::Auto => scene.cached(),
         }
     }
 
-    /// The same scene with one pixel and the smallest cache, for the time of a change of size.
-    pub(crate) fn shrunk(&self, limits: &wgpu::Limits) -> Result<Self, Error> {
-        let blocks = self.blocks();
-        let cache = CachePlan::fit(blocks, CachePlan::minimum_bytes(blocks), limits)?;
-        let samples = SamplePlan::Cached(cache);
-        let wavefront = WavefrontPlan::new([1, 1], self.wavefront.outputs(), limits)?;
-        let strategy = self.strategy.shrunk(limits)?;
-        Ok(Self { samples, wavefront, strategy, ..self.clone() })
-    }
-
-    /// The parts, in or left out.
+    /// The parts, in or left out, by the time when they are needed.
     #[must_use]
     pub fn parts(&self) -> &[Part] {
         &self.parts
     }
 
-    /// Most bytes that the scene ever takes.
+    /// Most bytes that the scene ever takes: those of loading or of rendering.
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        self.parts.iter().map(|part| part.bytes).sum()
+        self.loading_bytes().max(self.rendering_bytes())
+    }
+
+    /// Most bytes until the volume is loaded.
+    #[must_use]
+    pub fn loading_bytes(&self) -> u64 {
+        bytes(&self.parts, When::Loading)
+    }
+
+    /// Most bytes from then on.
+    #[must_use]
+    pub fn rendering_bytes(&self) -> u64 {
+        bytes(&self.parts, When::Rendering)
+    }
+
+    /// [`ScenePlan::bytes`] without the compressed stream's.
+    #[must_use]
+    pub fn overhead_bytes(&self) -> u64 {
+        self.bytes() - self.payload.bytes()
     }
 
     /// The budget that was given.
@@ -132,14 +174,27 @@ impl ScenePlan {
     pub fn explain(&self) -> String {
         let dims = self.macrocell.grid().dims();
         let [width, height] = self.wavefront.size();
-        let line = |name: &str, bytes: &str, why: &str| format!("{name:<16} {bytes:>12}  {why}\n");
-        let mut text = line("part", "bytes", &format!("{dims:?} voxels, {width}x{height} pixels"));
+        let line = |name: &str, bytes: &str, when: &str, why: &str| {
+            format!("{name:<16} {bytes:>12}  {when:<9}  {why}\n")
+        };
+        let scene = format!("{dims:?} voxels, {width}x{height} pixels");
+        let mut text = line("part", "bytes", "when", &scene);
         for part in &self.parts {
-            let bytes = if part.included { part.bytes.to_string() } else { "left out".into() };
-            text += &line(part.name, &bytes, &part.why);
+            let (bytes, when) = if part.included {
+                (part.bytes.to_string(), part.when.to_string())
+            } else {
+                ("left out".into(), String::new())
+            };
+            text += &line(part.name, &bytes, &when, &part.why);
         }
-        let budget = format!("of a budget of {}", self.budget_bytes);
-        text += &line("total", &self.bytes().to_string(), &budget);
+        for (when, bytes) in
+            [(When::Loading, self.loading_bytes()), (When::Rendering, self.rendering_bytes())]
+        {
+            text +=
+                &line("sum", &bytes.to_string(), &when.to_string(), "with what is always there");
+        }
+        let budget = format!("the larger sum, of a budget of {}", self.budget_bytes);
+        text += &line("total", &self.bytes().to_string(), "", &budget);
         text
     }
 }
@@ -147,71 +202,87 @@ impl ScenePlan {
 /// What a scene consists of, whatever is kept of its samples.
 struct Scene<'a> {
     options: &'a RendererOptions,
+    limits: &'a wgpu::Limits,
     payload: PayloadPlan,
     macrocell: MacrocellPlan,
+    /// How the volume is being loaded already.
+    load: Option<LoadPlan>,
     wavefront: WavefrontPlan,
     strategy: StrategyPlan,
-    limits: &'a wgpu::Limits,
 }
 
 impl Scene<'_> {
-    /// The parts that do not depend on the samples, with their bytes. Staging grows with the budget
-    /// unless that leaves less than `rest` bytes.
-    fn fixed(&self, rest: u64) -> (LoadPlan, Vec<Part>, u64) {
-        let stream_bytes = self.payload.layout().stream_bytes();
-        let with = |load: LoadPlan| {
-            let parts =
-                fixed_parts(self.options, &self.payload, &self.macrocell, &load, &self.wavefront);
-            let bytes = parts.iter().map(|part| part.bytes).sum();
-            (load, parts, bytes)
-        };
-        let found = with(LoadPlan::new(stream_bytes, self.options.budget_bytes));
-        if found.2 + rest > self.options.budget_bytes {
-            return with(LoadPlan::smallest(stream_bytes));
-        }
-        found
+    fn blocks(&self) -> u64 {
+        self.macrocell.grid().block_count()
     }
 
-    fn cached(self) -> Result<ScenePlan, Error> {
-        let budget = self.options.budget_bytes;
-        let blocks = self.macrocell.grid().block_count();
-        let strategy = self.strategy;
-        let smallest =
-            CachePlan::minimum_bytes(blocks) + strategy.bytes(CachePlan::least_slots(blocks));
-        let (load, mut parts, fixed) = self.fixed(smallest);
-        let minimum = fixed + smallest;
-        if minimum > budget {
-            return Err(Error::BudgetTooSmall { minimum, budget });
-        }
-        let beside = |slots| strategy.bytes(slots);
-        let most_pages = strategy.most_slot_pages();
-        let cache = CachePlan::fit_beside(blocks, budget - fixed, self.limits, most_pages, beside)?;
-        parts.push(strategy.part(cache.slots()));
+    fn most_slots(&self) -> u64 {
+        self.options.most_slots.unwrap_or(u64::MAX)
+    }
+
+    /// Whether [`Residency::Auto`] may choose full residency.
+    fn may_be_resident(&self) -> bool {
+        self.strategy.can_be_resident() && self.blocks() <= self.most_slots()
+    }
+
+    fn cached(&self) -> Result<ScenePlan, Error> {
+        let blocks = self.blocks();
+        let beside = |slots| self.strategy.bytes(slots);
+        let smallest = CachePlan::minimum_bytes(blocks) + beside(CachePlan::least_slots(blocks));
+        let mut parts = self.parts();
+        self.check_budget(&parts, smallest)?;
+        let room = CacheRoom {
+            bytes: self.options.budget_bytes - bytes(&parts, When::Rendering),
+            most_pages: self.strategy.most_slot_pages(),
+            most_slots: self.most_slots(),
+        };
+        let cache = CachePlan::fit_beside(blocks, room, self.limits, beside)?;
+        parts.push(self.strategy.part(cache.slots()));
         parts.push(cache_part(&cache, blocks));
-        parts.push(left_out("resident volume", "decoded on demand"));
-        Ok(self.plan(SamplePlan::Cached(cache), load, parts))
+        parts.push(Part::left_out("resident volume", "decoded on demand"));
+        Ok(self.plan(SamplePlan::Cached(cache), parts))
     }
 
     fn resident(&self) -> Result<ScenePlan, Error> {
-        let budget = self.options.budget_bytes;
         if !self.strategy.can_be_resident() {
             return Err(Error::Wavefront(wavefront::Error::NeedsCache));
         }
-        let blocks = self.macrocell.grid().block_count();
+        let blocks = self.blocks();
         let resident = ResidentPlan::new(blocks, self.limits, self.strategy.most_slot_pages())?;
-        let (load, mut parts, fixed) = self.fixed(resident.bytes());
-        let minimum = fixed + resident.bytes();
+        let mut parts = self.parts();
+        parts.push(self.strategy.part(blocks));
+        parts.push(Part::left_out("cache", "every block is resident"));
+        let why = format!("{blocks} blocks, decoded at load");
+        parts.push(Part::new("resident volume", When::Always, resident.bytes(), why));
+        self.check_budget(&parts, 0)?;
+        Ok(self.plan(SamplePlan::Resident(resident), parts))
+    }
+
+    /// Refuses a budget that does not hold `parts` with the least staging while loading, or with
+    /// `more` bytes while rendering.
+    fn check_budget(&self, parts: &[Part], more: u64) -> Result<(), Error> {
+        let budget = self.options.budget_bytes;
+        let loading = bytes(parts, When::Loading) + self.load_plan(0).staging_bytes();
+        let minimum = loading.max(bytes(parts, When::Rendering) + more);
         if minimum > budget {
             return Err(Error::BudgetTooSmall { minimum, budget });
         }
-        parts.push(self.strategy.part(blocks));
-        parts.push(left_out("cache", "every block is resident"));
-        let why = format!("{blocks} blocks, decoded at load");
-        parts.push(part("resident volume", resident.bytes(), why));
-        Ok(self.plan(SamplePlan::Resident(resident), load, parts))
+        Ok(())
     }
 
-    fn plan(&self, samples: SamplePlan, load: LoadPlan, parts: Vec<Part>) -> ScenePlan {
+    /// How the volume is loaded with about `room` bytes for staging.
+    fn load_plan(&self, room: u64) -> LoadPlan {
+        let stream_bytes = self.payload.layout().stream_bytes();
+        self.load.unwrap_or_else(|| LoadPlan::new(stream_bytes, room))
+    }
+
+    /// The plan, once all parts but the staging memory of the stream are known: that takes what
+    /// rendering needs more than loading.
+    fn plan(&self, samples: SamplePlan, mut parts: Vec<Part>) -> ScenePlan {
+        let room = bytes(&parts, When::Rendering).saturating_sub(bytes(&parts, When::Loading));
+        let load = self.load_plan(room);
+        parts.push(Part::new("upload", When::Loading, load.staging_bytes(), "stream, in pieces"));
+        parts.sort_by_key(|part| part.when);
         ScenePlan {
             payload: self.payload.clone(),
             macrocell: self.macrocell.clone(),
@@ -223,85 +294,62 @@ impl Scene<'_> {
             budget_bytes: self.options.budget_bytes,
         }
     }
-}
 
-/// What the chosen strategy allocates.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum StrategyPlan {
-    RunAhead,
-    #[cfg(feature = "block-sorted")]
-    BlockSorted(wavefront::BlockSortedOptions, wavefront::BlockSortedPlan),
-}
-
-impl StrategyPlan {
-    #[cfg_attr(
-        not(feature = "block-sorted"),
-        expect(unused_variables, reason = "RunAhead needs no memory of its own")
-    )]
-    fn new(strategy: TraversalStrategy, rays: u64, limits: &wgpu::Limits) -> Result<Self, Error> {
-        match strategy {
-            TraversalStrategy::RunAhead => Ok(Self::RunAhead),
-            #[cfg(feature = "block-sorted")]
-            TraversalStrategy::BlockSorted(options) => {
-                let plan = wavefront::BlockSortedPlan::new(rays, options, limits)?;
-                Ok(Self::BlockSorted(options, plan))
-            }
-        }
+    /// The parts that do not depend on what is kept of the samples.
+    fn parts(&self) -> Vec<Part> {
+        let mut parts = Vec::from(self.volume_parts());
+        parts.extend(self.picture_parts());
+        let readback = ReadbackRing::new(&Ledger::new(), "plan", READBACK_BYTES, PASSES_IN_FLIGHT)
+            .bytes_limit();
+        parts.extend([
+            Part::new("parameters", When::Always, PARAMS_STAGING, "staging"),
+            Part::new("readback", When::Always, readback + CONTROL_BYTES, "counters of two passes"),
+        ]);
+        parts
     }
 
-    /// Pages of slots that the strategy's kernels have bindings for beside their other buffers.
-    fn most_slot_pages(self) -> u64 {
-        match self {
-            Self::RunAhead => 4,
-            #[cfg(feature = "block-sorted")]
-            Self::BlockSorted(..) => 3,
-        }
-    }
-
-    /// Whether the strategy works on a volume that is resident as a whole.
-    fn can_be_resident(self) -> bool {
-        match self {
-            Self::RunAhead => true,
-            #[cfg(feature = "block-sorted")]
-            Self::BlockSorted(..) => false,
-        }
-    }
-
-    /// The same for one ray.
-    fn shrunk(self, limits: &wgpu::Limits) -> Result<Self, Error> {
-        match self {
-            Self::RunAhead => Self::new(TraversalStrategy::RunAhead, 1, limits),
-            #[cfg(feature = "block-sorted")]
-            Self::BlockSorted(options, _) => {
-                Self::new(TraversalStrategy::BlockSorted(options), 1, limits)
-            }
-        }
-    }
-
-    /// Bytes beside rays and pictures, with a cache of `slots` slots.
-    #[cfg_attr(
-        not(feature = "block-sorted"),
-        expect(unused_variables, reason = "RunAhead needs nothing for a slot")
-    )]
-    fn bytes(&self, slots: u64) -> u64 {
-        match self {
-            Self::RunAhead => 0,
-            #[cfg(feature = "block-sorted")]
-            Self::BlockSorted(_, plan) => plan.bytes(slots),
-        }
-    }
-
-    fn part(&self, slots: u64) -> Part {
-        let bytes = self.bytes(slots);
-        match self {
-            Self::RunAhead => Part { bytes, ..left_out("block pairs", "strategy RunAhead") },
-            #[cfg(feature = "block-sorted")]
-            Self::BlockSorted(options, _) => part(
-                "block pairs",
-                bytes,
-                format!("strategy BlockSorted, start factor {}", options.start_factor),
+    fn volume_parts(&self) -> [Part; 6] {
+        let Self { payload, macrocell, .. } = self;
+        let masks = macrocell.mask_bytes() + Masks::params_bytes(macrocell);
+        let scratch =
+            macrocell.scratch_bytes() + RangeScratch::PARAMS_BYTES + ExtremaBuffers::BYTES;
+        let stream = format!("compressed stream, {} page(s)", payload.page_count());
+        [
+            Part::new("payload", When::Always, payload.bytes(), stream),
+            Part::new(
+                "ranges",
+                When::Always,
+                macrocell.range_bytes(),
+                "value ranges, 2 bytes a block",
             ),
-        }
+            Part::new("masks", When::Always, masks, "active blocks of one isovalue"),
+            if macrocell.grid().has_third_level() {
+                Part::new("third level", When::Always, 0, "counted with the masks")
+            } else {
+                Part::left_out("third level", "fewer than 512 coarse cells")
+            },
+            Part::new("range scratch", When::Loading, scratch, "extrema of 33^3 blocks"),
+            Part::new("decode", When::Rendering, DecodeBuffers::BYTES, "parameters"),
+        ]
+    }
+
+    fn picture_parts(&self) -> [Part; 4] {
+        let Self { options, wavefront, .. } = self;
+        [
+            Part::new("pictures", When::Always, wavefront.output_bytes(), picture_names(wavefront)),
+            match options.draw_target {
+                Some(_) => {
+                    Part::new("draw", When::Always, DrawBuffers::BYTES, "into the caller's targets")
+                }
+                None => Part::left_out("draw", "no draw target"),
+            },
+            if options.capture {
+                Part::new("capture", When::Always, capture::bytes(wavefront), "pictures read back")
+            } else {
+                Part::left_out("capture", "not asked for")
+            },
+            Part::new("rays", When::Rendering, wavefront.ray_bytes(), "states and active lists"),
+        ]
     }
 }
 
@@ -344,62 +392,30 @@ fn check_limits(limits: &wgpu::Limits) -> Result<(), Error> {
     Ok(())
 }
 
-fn part(name: &'static str, bytes: u64, why: impl Into<String>) -> Part {
-    Part { name, bytes, why: why.into(), included: true }
+impl Part {
+    pub(crate) fn new(name: &'static str, when: When, bytes: u64, why: impl Into<String>) -> Self {
+        Self { name, when, bytes, why: why.into(), included: true }
+    }
+
+    pub(crate) fn left_out(name: &'static str, why: &'static str) -> Self {
+        Self { name, when: When::Rendering, bytes: 0, why: why.into(), included: false }
+    }
 }
 
-fn left_out(name: &'static str, why: &'static str) -> Part {
-    Part { name, bytes: 0, why: why.into(), included: false }
+impl fmt::Display for When {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Always => "always",
+            Self::Loading => "loading",
+            Self::Rendering => "rendering",
+        })
+    }
 }
 
-fn fixed_parts(
-    options: &RendererOptions,
-    payload: &PayloadPlan,
-    macrocell: &MacrocellPlan,
-    load: &LoadPlan,
-    wavefront: &WavefrontPlan,
-) -> Vec<Part> {
-    let grid = macrocell.grid();
-    let readback = ReadbackRing::new(&Ledger::new(), "plan", READBACK_BYTES, PASSES_IN_FLIGHT);
-    let scratch = macrocell.scratch_bytes() + RangeScratch::PARAMS_BYTES + ExtremaBuffers::BYTES;
-    let mut parts = vec![
-        part(
-            "payload",
-            payload.bytes(),
-            format!("compressed stream, {} page(s)", payload.page_count()),
-        ),
-        part("ranges", macrocell.range_bytes(), "value ranges, 2 bytes a block"),
-        part(
-            "masks",
-            macrocell.mask_bytes() + Masks::params_bytes(macrocell),
-            "active blocks of one isovalue",
-        ),
-        part("range scratch", scratch, "while loading"),
-        part("upload", load.staging_bytes() + PARAMS_STAGING, "staging"),
-        part(
-            "readback",
-            readback.bytes_limit() + crate::renderer::CONTROL_BYTES,
-            "counters of two passes",
-        ),
-        part("rays", wavefront.ray_bytes(), "states and active lists"),
-        part("pictures", wavefront.output_bytes(), picture_names(wavefront)),
-        part("decode", DecodeBuffers::BYTES, "parameters"),
-    ];
-    parts.push(if grid.has_third_level() {
-        part("third level", 0, "counted with the masks")
-    } else {
-        left_out("third level", "fewer than 512 coarse cells")
-    });
-    parts.push(match options.draw_target {
-        Some(_) => part("draw", DrawBuffers::BYTES, "into the caller's targets"),
-        None => left_out("draw", "no draw target"),
-    });
-    parts.push(if options.capture {
-        part("capture", capture::bytes(wavefront), "pictures read back")
-    } else {
-        left_out("capture", "not asked for")
-    });
-    parts
+/// Bytes of the parts that are there at a time: those of `when` and what is always there.
+fn bytes(parts: &[Part], when: When) -> u64 {
+    let there = |part: &&Part| part.when == when || part.when == When::Always;
+    parts.iter().filter(there).map(|part| part.bytes).sum()
 }
 
 fn picture_names(wavefront: &WavefrontPlan) -> String {
@@ -414,5 +430,5 @@ fn picture_names(wavefront: &WavefrontPlan) -> String {
 fn cache_part(cache: &CachePlan, blocks: u64) -> Part {
     let share = 100.0 * cache.slots() as f64 / blocks as f64;
     let why = format!("{} slots for {blocks} blocks ({share:.1} %)", cache.slots());
-    part("cache", cache.bytes(), why)
+    Part::new("cache", When::Rendering, cache.bytes(), why)
 }

@@ -1,22 +1,17 @@
-//! The renderer: schedule, state and reports.
+//! The renderer: schedule and state.
 
-use bytemuck::{Pod, Zeroable};
 use gpu_primitives::kernel::dispatches_recorded;
 use gpu_primitives::memory::{Category, Ledger};
-use gpu_primitives::readback::ReadbackRing;
 use gpu_primitives::upload::UploadRing;
-use macrocell::{Masks, RangeBuffers};
-use wavefront::{FrameView, LookAhead, OutputTextures, ShadingParams, Statistics};
+use wavefront::{FrameView, LookAhead, OutputTextures, ShadingParams};
 use web_time::Instant;
-use zfp_gpu::Payload;
 
 use crate::capture::PendingCapture;
 use crate::load::Loader;
-use crate::plan::{PARAMS_CHUNK, PASSES_IN_FLIGHT};
+use crate::plan::PARAMS_CHUNK;
+use crate::records::{PassInfo, PassRecords};
 use crate::samples::SampleBuffers;
-use crate::schedule::Schedule;
-use crate::stages::{Picture, Stages};
-use crate::timing::Timer;
+use crate::stages::{Pictures, Rendering, Stages, VolumeBuffers};
 use crate::{
     CompressedVolume, Error, Frame, PassReport, RendererOptions, Residency, ScenePlan, wgpu,
 };
@@ -24,36 +19,9 @@ use crate::{
 /// Largest size of an isovalue or a sample.
 const LARGEST_VALUE: f32 = 2.126_764_8e37; // 2^124
 
-/// Rounds that count as missed when a frame starts with the last one's blocks in the cache: few are missing
-/// then, and those few are worth finding in two rounds.
+/// Rounds that count as missed when a frame starts with the last one's blocks in the cache: few are
+/// missing then, and those few are worth finding in two rounds.
 const WARM_MISSES: u32 = 3;
-
-/// What is read back after a pass.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-struct PassRecord {
-    rays: wavefront::Counters,
-    /// GPU clock ticks at the pass's begin and end, two words each; 0 without timestamps.
-    ticks: [u32; 4],
-    /// What follows is there with a cache only.
-    cache: lru_cache_gpu::Counters,
-    /// The cache's counters when the frame started.
-    cache_before: lru_cache_gpu::Counters,
-    statistics: Statistics,
-}
-
-/// Bytes of a [`PassRecord`].
-pub(crate) const READBACK_BYTES: u64 = size_of::<PassRecord>() as u64 + PROFILE_BYTES;
-
-/// Bytes of the timestamps that are read back with a pass, and of the buffer that they come from.
-#[cfg(feature = "wgpu-profiler")]
-const PROFILE_BYTES: u64 = gpu_primitives::profile::Profiler::BYTES;
-#[cfg(not(feature = "wgpu-profiler"))]
-const PROFILE_BYTES: u64 = 0;
-
-/// Bytes of the resolved timestamps and, with a cache, of the counters since the frame's start.
-pub(crate) const CONTROL_BYTES: u64 =
-    lru_cache_gpu::Counters::BYTES.1 + Timer::BYTES + PROFILE_BYTES;
 
 /// Renders one volume's isosurfaces progressively.
 ///
@@ -68,24 +36,25 @@ pub struct ProgressiveIsoRenderer {
     ledger: Ledger,
     stages: Stages,
     upload: UploadRing,
-    readback: ReadbackRing,
-    timer: Timer,
-    #[cfg(feature = "wgpu-profiler")]
-    profile: crate::timing::Profile,
-    payload: Payload,
-    ranges: RangeBuffers,
-    masks: Masks,
-    loader: Option<Loader>,
-    samples: SampleBuffers,
-    picture: Picture,
+    records: PassRecords,
+    buffers: VolumeBuffers,
+    pictures: Pictures,
+    phase: Phase,
     frame: Option<FrameState>,
     frame_count: u64,
     active_isovalue: Option<f32>,
     clear_cache: bool,
-    submitted: Vec<Submitted>,
-    schedule: Schedule,
-    last_report_at: Instant,
-    report: PassReport,
+}
+
+/// What has its memory beside that of the volume and the pictures.
+#[derive(Debug)]
+enum Phase {
+    /// The volume is on its way to the GPU.
+    Loading(Box<Loader>),
+    /// It is there. The next pass makes what rays need, except for samples that are there already.
+    Loaded(Option<SampleBuffers>),
+    /// Rays are at work.
+    Rendering(Box<Rendering>),
 }
 
 #[derive(Debug)]
@@ -93,23 +62,11 @@ struct FrameState {
     frame: Frame,
     view: FrameView,
     number: u64,
+    /// Whether the pictures show nothing of earlier frames.
+    cleared: bool,
     started: bool,
     passes: u32,
     rounds: u32,
-}
-
-/// A pass whose counters have not come back yet.
-#[derive(Debug, Clone, Copy)]
-struct Submitted {
-    tag: u64,
-    frame: u64,
-    pass: u32,
-    rounds: u32,
-    dispatches: u32,
-    begin: Instant,
-    cpu_ms: f64,
-    /// Bytes of the pass's [`PassRecord`] in what is read back.
-    record_bytes: usize,
 }
 
 impl ProgressiveIsoRenderer {
@@ -133,26 +90,11 @@ impl ProgressiveIsoRenderer {
         let plan = ScenePlan::new(&volume, &options, &limits)?;
         let ledger = Ledger::new();
         let stages = Stages::new(device, &plan, &options)?;
-        let payload = Payload::new(device, &ledger, &plan.payload);
-        let ranges = RangeBuffers::new(device, &ledger, &plan.macrocell);
-        let masks = Masks::new(device, &ledger, &stages.activate, &ranges);
-        let samples =
-            SampleBuffers::new(device, &ledger, &stages.samples, &plan.samples, &payload)?;
-        let kept = samples.kept();
-        let loader = Loader::new(device, &ledger, plan.load, &payload, &ranges, kept)?;
-        let picture = Picture::new(device, &ledger, &stages, &plan, &masks, &samples)?;
-        let (upload, readback) = (
-            UploadRing::new(&ledger, "progressive-iso.upload", PARAMS_CHUNK),
-            ReadbackRing::new(
-                &ledger,
-                "progressive-iso.readback",
-                READBACK_BYTES,
-                PASSES_IN_FLIGHT,
-            ),
-        );
-        let timer = Timer::new(device, queue, &ledger);
-        #[cfg(feature = "wgpu-profiler")]
-        let profile = crate::timing::Profile::new(device, queue, &ledger);
+        let buffers = VolumeBuffers::new(device, &ledger, &stages, &plan);
+        let pictures = Pictures::new(device, &ledger, &stages, &plan);
+        let loader = Loader::new(device, &ledger, &plan, &buffers)?;
+        let upload = UploadRing::new(&ledger, "progressive-iso.upload", PARAMS_CHUNK);
+        let records = PassRecords::new(device, queue, &ledger);
         Ok(Self {
             volume,
             options,
@@ -161,24 +103,14 @@ impl ProgressiveIsoRenderer {
             ledger,
             stages,
             upload,
-            readback,
-            timer,
-            #[cfg(feature = "wgpu-profiler")]
-            profile,
-            payload,
-            ranges,
-            masks,
-            loader: Some(loader),
-            samples,
-            picture,
+            records,
+            buffers,
+            pictures,
+            phase: Phase::Loading(Box::new(loader)),
             frame: None,
             frame_count: 0,
             active_isovalue: None,
             clear_cache: false,
-            submitted: Vec::new(),
-            schedule: Schedule::default(),
-            last_report_at: Instant::now(),
-            report: PassReport::default(),
         })
     }
 
@@ -199,11 +131,12 @@ impl ProgressiveIsoRenderer {
             frame: frame.clone(),
             view,
             number: self.frame_count,
+            cleared: false,
             started: false,
             passes: 0,
             rounds: 0,
         });
-        self.report.newest_frame = self.frame_count;
+        self.records.report.newest_frame = self.frame_count;
         Ok(())
     }
 
@@ -213,8 +146,8 @@ impl ProgressiveIsoRenderer {
     }
 
     /// Records one pass and submits it. Does not block; see [`PassReport`] for what the numbers
-    /// describe. While two passes are in flight, and once the frame is complete, nothing is recorded
-    /// and `submitted` is false.
+    /// describe. While two passes are in flight, until the GPU has finished the last pass that loads
+    /// the volume, and once the frame is complete, nothing is recorded and `submitted` is false.
     ///
     /// # Errors
     /// If no frame is set.
@@ -249,195 +182,147 @@ impl ProgressiveIsoRenderer {
         device: &wgpu::Device,
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<PassReport, Error> {
-        self.collect_reports();
+        self.records.collect();
         if self.frame.is_none() {
             return Err(Error::NoFrame);
         }
-        if self.report.complete() || !self.readback.has_room() {
+        if self.records.report.complete() || !self.records.has_room() || !self.advance(device)? {
             return Ok(self.report(false));
         }
         let (begin, dispatches) = (Instant::now(), dispatches_recorded());
         let span = tracing::debug_span!("progressive_iso.pass", frame = self.frame_count);
         let _entered = span.enter();
-        self.timer.record_begin(encoder);
-        #[cfg(feature = "wgpu-profiler")]
-        self.profile.begin();
-        if self.record_load(device, encoder)? {
-            self.record_frame(device, encoder);
-        }
-        #[cfg(feature = "wgpu-profiler")]
-        self.profile.end(encoder);
-        self.timer.record_end(encoder);
+        self.records.record_begin(encoder);
+        self.record_load(device, encoder)?;
+        self.record_frame(device, encoder);
+        self.records.record_end(encoder);
         let dispatches = dispatches_recorded().wrapping_sub(dispatches) as u32;
-        self.record_counters(device, encoder, begin, dispatches);
+        self.record_readback(device, encoder, begin, dispatches);
         Ok(self.report(true))
     }
 
-    /// Records the next piece of loading; true when the volume is complete.
+    /// Goes on to the next phase when it is time; true when there is something to record.
+    ///
+    /// What rays need is made only when the GPU has done with what loading needed, so that both
+    /// never take memory at a time.
+    fn advance(&mut self, device: &wgpu::Device) -> Result<bool, Error> {
+        if let Phase::Loading(loader) = &self.phase {
+            if !loader.is_recorded(&self.buffers) {
+                return Ok(true);
+            }
+            if !(self.records.is_idle() && loader.is_idle()) {
+                return Ok(false);
+            }
+            if let Phase::Loading(loader) = std::mem::replace(&mut self.phase, Phase::Loaded(None))
+            {
+                self.phase = Phase::Loaded(loader.into_samples());
+            }
+        }
+        if let Phase::Loaded(samples) = &mut self.phase {
+            let samples = samples.take();
+            let rendering = Rendering::new(
+                device,
+                &self.ledger,
+                &self.stages,
+                &self.plan,
+                &self.buffers,
+                &self.pictures.textures,
+                samples,
+            )?;
+            self.phase = Phase::Rendering(Box::new(rendering));
+            self.records.report.loaded = 1.0;
+        }
+        Ok(true)
+    }
+
+    /// Records the next piece of loading, if there is one.
     fn record_load(
         &mut self,
         device: &wgpu::Device,
         encoder: &mut wgpu::CommandEncoder,
-    ) -> Result<bool, Error> {
-        let Some(loader) = &mut self.loader else {
-            return Ok(true);
+    ) -> Result<(), Error> {
+        let (Phase::Loading(loader), Some(state)) = (&mut self.phase, &mut self.frame) else {
+            return Ok(());
         };
         let _span = tracing::debug_span!("progressive_iso.load").entered();
-        let complete = loader.record(
-            device,
-            encoder,
-            &mut self.upload,
-            &self.volume,
-            &mut self.payload,
-            &self.ranges,
-        )?;
-        self.report.loaded = loader.share(&self.volume, self.ranges.plan());
-        Ok(complete)
+        if !std::mem::replace(&mut state.cleared, true) {
+            let unfinished = state.frame.options.shading.unfinished;
+            self.pictures.textures.record_unfinished(encoder, unfinished);
+        }
+        loader.record(device, encoder, &mut self.upload, &self.volume, &mut self.buffers)?;
+        self.records.report.loaded = loader.share(&self.buffers);
+        Ok(())
     }
 
-    /// Records the rounds of one pass of the current frame.
+    /// Records the rounds of one pass of the current frame, once the volume is loaded.
     fn record_frame(&mut self, device: &wgpu::Device, encoder: &mut wgpu::CommandEncoder) {
-        let Some(mut state) = self.frame.take() else {
+        self.record_start(device, encoder);
+        let (Phase::Rendering(rendering), Some(state)) = (&self.phase, &mut self.frame) else {
             return;
         };
-        if !state.started {
-            self.record_start(device, encoder, &state);
-            state.started = true;
-        }
         state.passes += 1;
         let options = &state.frame.options;
-        for _ in 0..self.schedule.rounds(options.rounds_per_pass, options.pass_ms) {
+        for _ in 0..self.records.schedule.rounds(options.rounds_per_pass, options.pass_ms) {
             state.rounds += 1;
             let _span =
                 tracing::debug_span!("progressive_iso.round", round = state.rounds).entered();
-            let (stages, samples) = (&self.stages, &self.samples);
-            let Picture { rays, rounds, .. } = &self.picture;
-            rounds.record_round(encoder, &stages.rays, rays, &mut |encoder| {
-                samples.record_service(encoder, &stages.samples);
-            });
+            rendering.record_round(encoder, &self.stages);
         }
-        self.frame = Some(state);
     }
 
-    fn record_start(
-        &mut self,
-        device: &wgpu::Device,
-        encoder: &mut wgpu::CommandEncoder,
-        state: &FrameState,
-    ) {
+    /// Records the start of the current frame unless it has started.
+    fn record_start(&mut self, device: &wgpu::Device, encoder: &mut wgpu::CommandEncoder) {
+        let (Phase::Rendering(rendering), Some(state)) = (&self.phase, &mut self.frame) else {
+            return;
+        };
+        if std::mem::replace(&mut state.started, true) {
+            return;
+        }
         let _span = tracing::debug_span!("progressive_iso.start").entered();
-        let (stages, frame) = (&self.stages, &state.frame);
+        let (stages, frame, upload) = (&self.stages, &state.frame, &mut self.upload);
         let isovalue = frame.isovalues[0];
         let clear = std::mem::take(&mut self.clear_cache);
         let warm = !clear && self.active_isovalue == Some(isovalue);
-        self.samples.record_begin_frame(encoder, &stages.samples, clear);
+        rendering.samples.record_begin_frame(encoder, &stages.samples, clear);
         if self.active_isovalue != Some(isovalue) {
-            let (ranges, masks) = (&self.ranges, &self.masks);
-            stages.activate.record(device, encoder, &mut self.upload, ranges, masks, isovalue);
+            let VolumeBuffers { ranges, masks, .. } = &self.buffers;
+            stages.activate.record(device, encoder, upload, ranges, masks, isovalue);
             self.active_isovalue = Some(isovalue);
         }
-        let grid = self.plan.macrocell.grid();
-        let lru = self.plan.samples.params();
+        let (grid, lru) = (self.plan.macrocell.grid(), self.plan.samples.params());
         let look_ahead = LookAhead {
             blocks: frame.options.look_ahead,
             first_misses: if warm { WARM_MISSES } else { 0 },
         };
         let params = state.view.params(grid, lru, isovalue, look_ahead);
         let shading = ShadingParams::new(&frame.options.shading, self.volume.world_from_index);
-        let Picture { rays, rounds, .. } = &self.picture;
-        stages.rays.record_start(device, encoder, &mut self.upload, rays, &params, &shading);
-        rounds.record_start(encoder, &stages.rays, rays);
-        if let (Some(draw), Some(buffers)) = (&stages.draw, &self.picture.draw) {
-            draw.record_params(device, encoder, &mut self.upload, buffers, &state.view);
+        rendering.record_start(device, encoder, upload, stages, &params, &shading);
+        if let (Some(draw), Some(buffers)) = (&stages.draw, &self.pictures.draw) {
+            draw.record_params(device, encoder, upload, buffers, &state.view);
         }
     }
 
-    /// Records reading the counters back.
-    fn record_counters(
+    /// Records reading the pass's counters back.
+    fn record_readback(
         &mut self,
         device: &wgpu::Device,
         encoder: &mut wgpu::CommandEncoder,
         begin: Instant,
         dispatches: u32,
     ) {
-        let (ray_offset, ray_bytes) = wavefront::Counters::BYTES;
-        let mut parts = vec![(self.picture.rays.rays(), ray_offset, ray_bytes), self.timer.part()];
-        if let Some(counters) = self.samples.counters() {
-            parts.extend(counters);
-            parts.extend(self.picture.rounds.statistics());
-        }
-        let record_bytes = parts.iter().map(|part| part.2 as usize).sum();
-        let tag = self.submitted.last().map_or(1, |s| s.tag + 1);
-        #[cfg(feature = "wgpu-profiler")]
-        parts.extend(self.profile.part());
-        if self.readback.record(device, encoder, &parts, tag) {
-            let (frame, pass, rounds) = match &self.frame {
-                Some(state) if state.started => (state.number, state.passes, state.rounds),
-                _ => (0, 0, 0),
-            };
-            let cpu_ms = begin.elapsed().as_secs_f64() * 1e3;
-            let submitted =
-                Submitted { tag, frame, pass, rounds, dispatches, begin, cpu_ms, record_bytes };
-            self.submitted.push(submitted);
-        }
-    }
-
-    /// Takes in what the GPU has finished.
-    fn collect_reports(&mut self) {
-        while let Some((tag, bytes)) = self.readback.take() {
-            let Some(position) = self.submitted.iter().position(|s| s.tag == tag) else {
-                continue;
-            };
-            let submitted = self.submitted[position];
-            // Tags count on from the last one, so that one always stays.
-            self.submitted.drain(..position);
-            let mut record = PassRecord::zeroed();
-            let length = submitted.record_bytes.min(bytes.len()).min(size_of::<PassRecord>());
-            bytemuck::bytes_of_mut(&mut record)[..length].copy_from_slice(&bytes[..length]);
-            #[cfg(feature = "wgpu-profiler")]
-            self.profile.take(&bytes[length..]);
-            self.take_record(submitted, &record);
-        }
-    }
-
-    fn take_record(&mut self, submitted: Submitted, record: &PassRecord) {
-        if submitted.pass == 0 {
-            return;
-        }
-        self.loader = None;
-        self.take_time(submitted, record);
-        let since = |now: u32, before: u32| now.wrapping_sub(before);
-        let report = &mut self.report;
-        report.loaded = 1.0;
-        report.frame = submitted.frame;
-        report.pass = submitted.pass;
-        report.rounds = submitted.rounds;
-        report.dispatches = submitted.dispatches;
-        report.cpu_ms = submitted.cpu_ms;
-        report.gpu_ms = self.timer.milliseconds(record.ticks);
-        report.rays = self.options.size[0] * self.options.size[1];
-        report.entered_rays = record.rays.entered;
-        report.active_rays = record.rays.active;
-        report.hits = record.rays.hits;
-        report.blocks_used = since(record.cache.used, record.cache_before.used);
-        report.blocks_requested = since(record.cache.requested, record.cache_before.requested);
-        report.blocks_decoded = since(record.cache.decoded, record.cache_before.decoded);
-        report.speculation = record.statistics.speculation;
-        report.ray_block_pairs = record.statistics.pairs;
-        report.visible_blocks = record.statistics.visible_blocks;
-        report.blocks_evicted = since(record.cache.evicted, record.cache_before.evicted);
-    }
-
-    /// What a pass took, by the GPU's clock or, without one, from its recording or the report before on.
-    fn take_time(&mut self, submitted: Submitted, record: &PassRecord) {
-        let now = Instant::now();
-        let elapsed = now.duration_since(submitted.begin.max(self.last_report_at));
-        self.last_report_at = now;
-        let gpu_ms = self.timer.milliseconds(record.ticks);
-        let ms = gpu_ms.unwrap_or(1e3 * elapsed.as_secs_f64());
-        let same_frame = self.report.frame == submitted.frame;
-        let rounds_before = if same_frame { self.report.rounds } else { 0 };
-        self.schedule.take(submitted.rounds.saturating_sub(rounds_before), ms);
+        let counters = match &self.phase {
+            Phase::Rendering(rendering) => rendering.counters(),
+            _ => Vec::new(),
+        };
+        let (frame, pass, rounds) = match &self.frame {
+            Some(state) if state.started => (state.number, state.passes, state.rounds),
+            _ => (0, 0, 0),
+        };
+        let [width, height] = self.options.size;
+        let cpu_ms = begin.elapsed().as_secs_f64() * 1e3;
+        let pixels = width * height;
+        let info = PassInfo { frame, pass, rounds, pixels, dispatches, begin, cpu_ms };
+        self.records.record_readback(device, encoder, &counters, info);
     }
 
     fn report(&self, submitted: bool) -> PassReport {
@@ -445,13 +330,13 @@ impl ProgressiveIsoRenderer {
             submitted,
             bytes: self.ledger.total(),
             peak_bytes: self.ledger.peak(),
-            ..self.report
+            ..self.records.report
         }
     }
 
     /// The newest report, after taking in what the GPU has finished. Records nothing.
     pub fn poll_report(&mut self) -> PassReport {
-        self.collect_reports();
+        self.records.collect();
         self.report(false)
     }
 
@@ -496,7 +381,7 @@ impl ProgressiveIsoRenderer {
     /// # Errors
     /// Without [`RendererOptions::draw_target`].
     pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>) -> Result<(), Error> {
-        match (&self.stages.draw, &self.picture.draw) {
+        match (&self.stages.draw, &self.pictures.draw) {
             (Some(draw), Some(buffers)) => {
                 draw.draw(pass, buffers);
                 Ok(())
@@ -518,7 +403,7 @@ impl ProgressiveIsoRenderer {
         if !self.options.capture {
             return Err(Error::CaptureNotPlanned);
         }
-        Ok(PendingCapture::record(device, &self.ledger, encoder, &self.picture.textures))
+        Ok(PendingCapture::record(device, &self.ledger, encoder, &self.pictures.textures))
     }
 
     /// Reads the pictures back, blocking on the device: for offline use.
@@ -558,15 +443,14 @@ impl ProgressiveIsoRenderer {
     pub fn resize(&mut self, device: &wgpu::Device, size: [u32; 2]) -> Result<(), Error> {
         let options = RendererOptions { size, ..self.options };
         let plan = self.replan(&options)?;
-        // The old memory goes before the new one comes, or both together would exceed the budget.
-        let smallest = self.plan.shrunk(&self.limits)?;
-        self.rebuild_picture(device, &smallest)?;
-        if plan.samples != self.plan.samples {
-            self.rebuild_samples(device, &smallest, &options)?;
-            self.rebuild_samples(device, &plan, &options)?;
+        let (layout, strategy) = (plan.samples.layout(), plan.strategy);
+        if (layout, strategy) != (self.plan.samples.layout(), self.plan.strategy) {
+            self.stages = Stages::new(device, &plan, &options)?;
         }
+        // What goes does so before anything comes, or both together would exceed the budget.
+        self.release_rays(plan.samples == self.plan.samples);
+        self.pictures.resize(device, &self.ledger, &self.stages, &plan);
         self.options = options;
-        self.rebuild_picture(device, &plan)?;
         self.plan = plan;
         if let Some(state) = self.frame.take() {
             self.set_frame(&state.frame)?;
@@ -575,47 +459,43 @@ impl ProgressiveIsoRenderer {
     }
 
     /// A plan for other options with the same volume. What is resident stays so while the budget
-    /// allows it; what is cached stays cached, because loading is over.
+    /// allows it; what is cached stays cached, because loading is over. Until then, it goes on as it
+    /// was planned.
     fn replan(&self, options: &RendererOptions) -> Result<ScenePlan, Error> {
+        let load = matches!(self.phase, Phase::Loading(_)).then_some(self.plan.load);
         let plan = |residency| {
             let options = RendererOptions { residency, ..*options };
-            ScenePlan::new(&self.volume, &options, &self.limits)
+            ScenePlan::with_load(self.volume.layout(), &options, &self.limits, load)
         };
-        match (self.plan.residency(), options.residency) {
-            (Residency::Full, Residency::Auto) => {
+        match (self.plan.residency(), options.residency, load) {
+            (Residency::Full, Residency::Auto, None) => {
                 plan(Residency::Full).or_else(|_| plan(Residency::Cached))
             }
-            (residency, _) => plan(residency),
+            (residency, ..) => plan(residency),
         }
     }
 
-    fn rebuild_picture(&mut self, device: &wgpu::Device, plan: &ScenePlan) -> Result<(), Error> {
-        let (ledger, stages) = (&self.ledger, &self.stages);
-        self.picture = Picture::new(device, ledger, stages, plan, &self.masks, &self.samples)?;
-        Ok(())
-    }
-
-    fn rebuild_samples(
-        &mut self,
-        device: &wgpu::Device,
-        plan: &ScenePlan,
-        options: &RendererOptions,
-    ) -> Result<(), Error> {
-        let stages = Stages::new(device, plan, options)?;
-        let (ledger, payload) = (&self.ledger, &self.payload);
-        let samples = SampleBuffers::new(device, ledger, &stages.samples, &plan.samples, payload)?;
-        (self.stages, self.samples) = (stages, samples);
-        Ok(())
+    /// Frees the memory of the rays and, unless they are kept, of the samples.
+    fn release_rays(&mut self, keep_samples: bool) {
+        let samples = match std::mem::replace(&mut self.phase, Phase::Loaded(None)) {
+            Phase::Loading(loader) => {
+                self.phase = Phase::Loading(loader);
+                return;
+            }
+            Phase::Loaded(samples) => samples,
+            Phase::Rendering(rendering) => Some(rendering.samples),
+        };
+        self.phase = Phase::Loaded(samples.filter(|_| keep_samples));
     }
 
     /// Colour as known so far: `Rgba8Unorm` with display-referred values.
     pub fn color_view(&self) -> &wgpu::TextureView {
-        self.picture.textures.color_view()
+        self.pictures.textures.color_view()
     }
 
     /// The pictures' textures.
     pub fn textures(&self) -> &OutputTextures {
-        &self.picture.textures
+        &self.pictures.textures
     }
 
     /// What the scene consists of.
@@ -632,7 +512,7 @@ impl ProgressiveIsoRenderer {
     /// timestamp queries.
     #[cfg(feature = "wgpu-profiler")]
     pub fn stage_times(&self) -> &[gpu_primitives::profile::StageTime] {
-        self.profile.newest()
+        self.records.stage_times()
     }
 
     /// The volume.

@@ -1,12 +1,14 @@
 //! A scene's pipelines, and the memory that they work on.
 
 use gpu_primitives::memory::Ledger;
-use macrocell::{Activate, Masks};
+use gpu_primitives::upload::UploadRing;
+use macrocell::{Activate, Masks, RangeBuffers};
 use wavefront::{
-    Draw, DrawBuffers, OutputTextures, RayBuffers, Rays, Rounds, RunAhead, Scene, Strategy,
+    Draw, DrawBuffers, FrameParams, OutputTextures, RayBuffers, Rays, Rounds, Scene, ShadingParams,
+    Strategy,
 };
+use zfp_gpu::Payload;
 
-use crate::plan::StrategyPlan;
 use crate::samples::{SampleBuffers, SampleStages};
 use crate::{Error, RendererOptions, ScenePlan, wgpu};
 
@@ -20,24 +22,27 @@ pub(crate) struct Stages {
     pub(crate) draw: Option<Draw>,
 }
 
-/// Everything that depends on the picture's size.
+/// The volume as it is needed all the time.
 #[derive(Debug)]
-pub(crate) struct Picture {
+pub(crate) struct VolumeBuffers {
+    pub(crate) payload: Payload,
+    pub(crate) ranges: RangeBuffers,
+    pub(crate) masks: Masks,
+}
+
+/// The pictures, which callers may show from the start.
+#[derive(Debug)]
+pub(crate) struct Pictures {
     pub(crate) textures: OutputTextures,
-    pub(crate) rays: RayBuffers,
-    pub(crate) rounds: Box<dyn Rounds>,
     pub(crate) draw: Option<DrawBuffers>,
 }
 
-fn strategy(device: &wgpu::Device, plan: &ScenePlan) -> Box<dyn Strategy> {
-    let samples = plan.samples.layout();
-    match plan.strategy {
-        StrategyPlan::RunAhead => Box::new(RunAhead::new(device, samples)),
-        #[cfg(feature = "block-sorted")]
-        StrategyPlan::BlockSorted(_, plan) => {
-            Box::new(wavefront::BlockSorted::new(device, samples.pages, plan))
-        }
-    }
+/// What rays need, once the volume is loaded.
+#[derive(Debug)]
+pub(crate) struct Rendering {
+    pub(crate) samples: SampleBuffers,
+    rays: RayBuffers,
+    rounds: Box<dyn Rounds>,
 }
 
 impl Stages {
@@ -47,33 +52,121 @@ impl Stages {
         options: &RendererOptions,
     ) -> Result<Self, Error> {
         let _span = tracing::info_span!("progressive_iso.pipelines").entered();
+        let layout = plan.samples.layout();
         Ok(Self {
             activate: Activate::new(device, plan.macrocell.grid().has_third_level()),
             samples: SampleStages::new(device, &plan.samples)?,
-            rays: Rays::new(device, plan.wavefront.outputs(), plan.samples.layout()),
-            strategy: strategy(device, plan),
+            rays: Rays::new(device, plan.wavefront.outputs(), layout),
+            strategy: plan.strategy.pipelines(device, layout),
             draw: options.draw_target.map(|target| Draw::new(device, &target)),
         })
     }
 }
 
-impl Picture {
+impl VolumeBuffers {
     pub(crate) fn new(
         device: &wgpu::Device,
         ledger: &Ledger,
         stages: &Stages,
         plan: &ScenePlan,
-        masks: &Masks,
-        samples: &SampleBuffers,
-    ) -> Result<Self, Error> {
+    ) -> Self {
+        let payload = Payload::new(device, ledger, &plan.payload);
+        let ranges = RangeBuffers::new(device, ledger, &plan.macrocell);
+        let masks = Masks::new(device, ledger, &stages.activate, &ranges);
+        Self { payload, ranges, masks }
+    }
+}
+
+impl Pictures {
+    pub(crate) fn new(
+        device: &wgpu::Device,
+        ledger: &Ledger,
+        stages: &Stages,
+        plan: &ScenePlan,
+    ) -> Self {
         let wavefront = &plan.wavefront;
         let textures = OutputTextures::new(device, ledger, wavefront.outputs(), wavefront.size());
-        let samples = samples.samples();
-        let rays = RayBuffers::new(device, ledger, &stages.rays, wavefront, samples, &textures);
-        let scene = Scene { rays: &rays, masks: masks.buffer(), samples };
+        let draw = Self::draw_buffers(device, ledger, stages, &textures);
+        Self { textures, draw }
+    }
+
+    /// Replaces the pictures by others of the plan's size; the old memory goes first.
+    pub(crate) fn resize(
+        &mut self,
+        device: &wgpu::Device,
+        ledger: &Ledger,
+        stages: &Stages,
+        plan: &ScenePlan,
+    ) {
+        self.draw = None;
+        self.textures.resize(device, ledger, plan.wavefront.size());
+        self.draw = Self::draw_buffers(device, ledger, stages, &self.textures);
+    }
+
+    fn draw_buffers(
+        device: &wgpu::Device,
+        ledger: &Ledger,
+        stages: &Stages,
+        textures: &OutputTextures,
+    ) -> Option<DrawBuffers> {
+        stages.draw.as_ref().and_then(|draw| DrawBuffers::new(device, ledger, draw, textures))
+    }
+}
+
+impl Rendering {
+    /// Memory for rays, and for samples unless there are some already.
+    pub(crate) fn new(
+        device: &wgpu::Device,
+        ledger: &Ledger,
+        stages: &Stages,
+        plan: &ScenePlan,
+        volume: &VolumeBuffers,
+        textures: &OutputTextures,
+        samples: Option<SampleBuffers>,
+    ) -> Result<Self, Error> {
+        let samples = match samples {
+            Some(samples) => samples,
+            None => {
+                let payload = &volume.payload;
+                SampleBuffers::new(device, ledger, &stages.samples, &plan.samples, payload)?
+            }
+        };
+        let read = samples.samples();
+        let rays = RayBuffers::new(device, ledger, &stages.rays, &plan.wavefront, read, textures);
+        let scene = Scene { rays: &rays, masks: volume.masks.buffer(), samples: read };
         let rounds = stages.strategy.bind(device, ledger, scene)?;
-        let draw =
-            stages.draw.as_ref().and_then(|d| DrawBuffers::new(device, ledger, d, &textures));
-        Ok(Self { textures, rays, rounds, draw })
+        Ok(Self { samples, rays, rounds })
+    }
+
+    /// Records the first rays of a frame.
+    pub(crate) fn record_start(
+        &self,
+        device: &wgpu::Device,
+        encoder: &mut wgpu::CommandEncoder,
+        upload: &mut UploadRing,
+        stages: &Stages,
+        params: &FrameParams,
+        shading: &ShadingParams,
+    ) {
+        stages.rays.record_start(device, encoder, upload, &self.rays, params, shading);
+        self.rounds.record_start(encoder, &stages.rays, &self.rays);
+    }
+
+    /// Records one round.
+    pub(crate) fn record_round(&self, encoder: &mut wgpu::CommandEncoder, stages: &Stages) {
+        self.rounds.record_round(encoder, &stages.rays, &self.rays, &mut |encoder| {
+            self.samples.record_service(encoder, &stages.samples);
+        });
+    }
+
+    /// What is read back after a pass: parts (buffer, byte offset, bytes).
+    pub(crate) fn counters(&self) -> Vec<(&wgpu::Buffer, u64, u64)> {
+        let (offset, bytes) = wavefront::Counters::BYTES;
+        let mut parts = vec![(self.rays.rays(), offset, bytes)];
+        if let Some(counters) = self.samples.counters() {
+            parts.extend(counters);
+            parts.extend(self.rounds.statistics());
+        }
+        parts
     }
 }

@@ -62,6 +62,13 @@ impl UploadRing {
         self.waiting.lock().iter().map(|chunk| chunk.size()).sum()
     }
 
+    /// Whether no encoder or submission uses a chunk: dropping the ring then frees all its memory.
+    #[must_use]
+    pub fn is_idle(&self) -> bool {
+        // Every chunk in use has a share in the list that its callback brings it back to.
+        Arc::strong_count(&self.waiting) == 1
+    }
+
     /// Writes `data` at byte `offset` of `target` at this point of the encoder.
     ///
     /// Data larger than a chunk is split over several. `offset` and the length are multiples of 4

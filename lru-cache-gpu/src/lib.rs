@@ -12,6 +12,6 @@ pub mod wgsl;
 pub use buffers::CacheBuffers;
 pub use error::Error;
 pub use gpu_primitives::wgpu;
-pub use plan::{CachePlan, LruParams, MAX_PAGES, SLOT_BYTES};
+pub use plan::{CachePlan, CacheRoom, LruParams, MAX_PAGES, SLOT_BYTES};
 pub use resident::{ResidentBuffers, ResidentPlan};
 pub use service::{Counters, Service};

@@ -44,6 +44,25 @@ pub struct LruParams {
     pub heads: u32,
 }
 
+/// What a cache may take.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CacheRoom {
+    /// Most bytes, what others allocate beside the cache included.
+    pub bytes: u64,
+    /// Most pages of slots, 1 to [`MAX_PAGES`].
+    pub most_pages: u64,
+    /// Most slots; there are never fewer than [`CachePlan::least_slots`].
+    pub most_slots: u64,
+}
+
+impl CacheRoom {
+    /// Room for as many slots as `bytes` hold.
+    #[must_use]
+    pub fn new(bytes: u64) -> Self {
+        Self { bytes, most_pages: MAX_PAGES, most_slots: u64::MAX }
+    }
+}
+
 /// Sizes of everything this crate allocates for one volume.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CachePlan {
@@ -64,29 +83,30 @@ impl CachePlan {
     /// # Errors
     /// If there are too many blocks, or `bytes` is less than [`CachePlan::minimum_bytes`].
     pub fn fit(blocks: u64, bytes: u64, limits: &wgpu::Limits) -> Result<Self, Error> {
-        Self::fit_beside(blocks, bytes, limits, MAX_PAGES, |_| 0)
+        Self::fit_beside(blocks, CacheRoom::new(bytes), limits, |_| 0)
     }
 
-    /// Like [`CachePlan::fit`] with at most `most_pages` pages of slots, 1 to [`MAX_PAGES`], where
-    /// others allocate memory of their own, `beside(slots)` bytes, a function that does not
-    /// decrease with the number of slots.
+    /// Like [`CachePlan::fit`] in a `room` where others allocate memory of their own,
+    /// `beside(slots)` bytes, a function that does not decrease with the number of slots.
     ///
     /// # Errors
     /// As [`CachePlan::fit`]; the minimum includes what the others need.
     pub fn fit_beside(
         blocks: u64,
-        bytes: u64,
+        room: CacheRoom,
         limits: &wgpu::Limits,
-        most_pages: u64,
         beside: impl Fn(u64) -> u64,
     ) -> Result<Self, Error> {
+        let CacheRoom { bytes, most_pages, most_slots } = room;
         let most_blocks = u64::from(u32::MAX);
         if blocks > most_blocks {
             return Err(Error::TooManyBlocks { blocks, most: most_blocks });
         }
         let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let slots_per_page = slots_of_a_page(binding);
-        let most = blocks.min(slots_per_page * most_pages.clamp(1, MAX_PAGES)).min(MAX_SLOTS);
+        let most = [slots_per_page * most_pages.clamp(1, MAX_PAGES), most_slots, MAX_SLOTS]
+            .into_iter()
+            .fold(blocks, u64::min);
         let with = |slots| Self { blocks, slots, slots_per_page };
         let needed = |slots| with(slots).bytes() + beside(slots);
         let least = Self::least_slots(blocks);
@@ -234,6 +254,16 @@ mod tests {
             Err(Error::TooFewBytes { blocks: 1000, minimum, available: minimum - 1 })
         );
         assert_eq!(CachePlan::fit(3, 1 << 20, &limits).unwrap().slots(), 3);
+    }
+
+    #[test]
+    fn slots_can_be_capped() {
+        let limits = wgpu::Limits::default();
+        for (most_slots, slots) in [(0, 8), (9, 9), (131_072, 131_072), (u64::MAX, 1_000_000)] {
+            let room = CacheRoom { most_slots, ..CacheRoom::new(1 << 30) };
+            let plan = CachePlan::fit_beside(1_000_000, room, &limits, |_| 0).unwrap();
+            assert_eq!(plan.slots(), slots);
+        }
     }
 
     #[test]

@@ -1,8 +1,11 @@
 //! Memory: never more than planned, never more than allowed, nothing for what is left out.
 
 use progressive_iso::{
-    Category, DrawTarget, Error, Outputs, ProgressiveIsoRenderer, RendererOptions, ScenePlan, wgpu,
+    Category, DrawTarget, Error, Outputs, PassReport, ProgressiveIsoRenderer, RendererOptions,
+    ScenePlan, StreamLayout, When, wgpu,
 };
+
+use volume_io::ZfpVolume;
 
 use crate::invariance::{minimum_budget, same_picture};
 use crate::support::{Gpu, Scene, options};
@@ -28,7 +31,12 @@ fn what_is_allocated_stays_within_the_plan_and_the_plan_within_the_budget() {
             let options = RendererOptions { budget_bytes, ..base };
             let plan = plan(&scene, &options).unwrap();
             assert!(plan.bytes() <= budget_bytes, "{dims:?}: {}", plan.explain());
-            assert_eq!(plan.bytes(), plan.parts().iter().map(|p| p.bytes).sum::<u64>());
+            let sum = |when| {
+                let there =
+                    plan.parts().iter().filter(|p| p.when == when || p.when == When::Always);
+                there.map(|p| p.bytes).sum::<u64>()
+            };
+            assert_eq!(plan.bytes(), sum(When::Loading).max(sum(When::Rendering)));
             if budget_bytes == least && scene.volume.voxel_count() > 100_000 {
                 continue; // thousands of passes
             }
@@ -39,7 +47,8 @@ fn what_is_allocated_stays_within_the_plan_and_the_plan_within_the_budget() {
                 gpu.finish(&mut renderer, &scene.frame(scene.orbit(50.0, 10.0, size)));
             } else {
                 renderer.set_frame(&frame).unwrap();
-                for _ in 0..6 {
+                let few = |report: PassReport| report.pass < 4 && !report.complete();
+                while few(renderer.poll_report()) {
                     renderer.render_pass(&gpu.device, &gpu.queue).unwrap();
                     renderer.capture_blocking(&gpu.device, &gpu.queue).unwrap();
                 }
@@ -56,6 +65,15 @@ fn what_is_allocated_stays_within_the_plan_and_the_plan_within_the_budget() {
             assert_eq!(sum, report.bytes);
         }
     }
+}
+
+#[test]
+fn plans_need_no_stream() {
+    let scene = Scene::generated("gyroid", [21, 13, 9], 8.0);
+    let (options, limits) = (options([64, 48]), wgpu::Limits::default());
+    let ZfpVolume { dims, bits_per_block, first_bit, .. } = scene.volume;
+    let layout = StreamLayout::new(dims, bits_per_block, first_bit).unwrap();
+    assert_eq!(ScenePlan::for_layout(&layout, &options, &limits), plan(&scene, &options));
 }
 
 /// Not only for small volumes: staging, which grows with the budget, must not move the minimum.
@@ -78,7 +96,7 @@ fn the_minimum_that_the_error_names_is_enough_and_one_byte_less_is_not() {
             plan(&scene, &RendererOptions { budget_bytes, ..options(size) })
                 .map(|plan| (plan.bytes() <= budget_bytes, plan.slots()))
         };
-        assert_eq!(with(least), Ok((true, 8)), "{dims:?}");
+        assert!(matches!(with(least), Ok((true, 8..))), "{dims:?}");
         assert_eq!(
             with(least - 1),
             Err(Error::BudgetTooSmall { minimum: least, budget: least - 1 }),

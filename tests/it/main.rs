@@ -12,6 +12,7 @@ mod draw;
 mod errors;
 mod invariance;
 mod left_out;
+mod memory;
 mod published;
 mod reference;
 mod residency;

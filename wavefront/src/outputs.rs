@@ -67,6 +67,37 @@ const STATUS: PictureFormat = PictureFormat {
     format: wgpu::TextureFormat::R32Uint,
 };
 
+impl PictureFormat {
+    fn texture(self, device: &wgpu::Device, ledger: &Ledger, size: [u32; 2]) -> Texture {
+        let desc = wgpu::TextureDescriptor {
+            label: Some(self.label),
+            size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: self.format,
+            usage: wgpu::TextureUsages::STORAGE_BINDING
+                | wgpu::TextureUsages::TEXTURE_BINDING
+                | wgpu::TextureUsages::RENDER_ATTACHMENT
+                | wgpu::TextureUsages::COPY_SRC,
+            view_formats: &[],
+        };
+        ledger.texture(device, Category::Outputs, &desc)
+    }
+
+    /// An unfinished pixel, whose colour is `unfinished`, as `outputs_write_empty` writes it.
+    fn unfinished(self, unfinished: [f32; 4]) -> wgpu::Color {
+        let [r, g, b, a] = unfinished.map(f64::from);
+        let first = |r: f64| wgpu::Color { r, ..wgpu::Color::TRANSPARENT };
+        match self {
+            COLOR => wgpu::Color { r, g, b, a },
+            DEPTH => first(DEPTH_NONE.into()),
+            STATUS => first(f64::from(PixelStatus::Unfinished as u32)),
+            _ => wgpu::Color::TRANSPARENT,
+        }
+    }
+}
+
 impl Outputs {
     /// The textures, in the order in which kernels bind them.
     fn formats(self) -> impl Iterator<Item = PictureFormat> {
@@ -111,31 +142,44 @@ pub struct OutputTextures {
 impl OutputTextures {
     /// Allocates the textures asked for.
     pub fn new(device: &wgpu::Device, ledger: &Ledger, outputs: Outputs, size: [u32; 2]) -> Self {
-        let textures: Vec<Texture> = outputs
+        let mut pictures = Self { outputs, textures: Vec::new(), views: Vec::new() };
+        pictures.resize(device, ledger, size);
+        pictures
+    }
+
+    /// Replaces the textures by others of another size, without contents; the old ones go first.
+    pub fn resize(&mut self, device: &wgpu::Device, ledger: &Ledger, size: [u32; 2]) {
+        self.views.clear();
+        self.textures.clear();
+        let textures = self.outputs.formats().map(|picture| picture.texture(device, ledger, size));
+        self.textures.extend(textures);
+        let view = |t: &Texture| t.create_view(&wgpu::TextureViewDescriptor::default());
+        self.views.extend(self.textures.iter().map(view));
+    }
+
+    /// Records making every pixel an unfinished one of the colour `unfinished`.
+    pub fn record_unfinished(&self, encoder: &mut wgpu::CommandEncoder, unfinished: [f32; 4]) {
+        let attachments: Vec<_> = self
+            .outputs
             .formats()
-            .map(|picture| {
-                let size =
-                    wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 };
-                let desc = wgpu::TextureDescriptor {
-                    label: Some(picture.label),
-                    size,
-                    mip_level_count: 1,
-                    sample_count: 1,
-                    dimension: wgpu::TextureDimension::D2,
-                    format: picture.format,
-                    usage: wgpu::TextureUsages::STORAGE_BINDING
-                        | wgpu::TextureUsages::TEXTURE_BINDING
-                        | wgpu::TextureUsages::COPY_SRC,
-                    view_formats: &[],
-                };
-                ledger.texture(device, Category::Outputs, &desc)
+            .zip(&self.views)
+            .map(|(picture, view)| {
+                Some(wgpu::RenderPassColorAttachment {
+                    view,
+                    depth_slice: None,
+                    resolve_target: None,
+                    ops: wgpu::Operations {
+                        load: wgpu::LoadOp::Clear(picture.unfinished(unfinished)),
+                        store: wgpu::StoreOp::Store,
+                    },
+                })
             })
             .collect();
-        let views = textures
-            .iter()
-            .map(|t| t.create_view(&wgpu::TextureViewDescriptor::default()))
-            .collect();
-        Self { outputs, textures, views }
+        encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("wavefront.unfinished"),
+            color_attachments: &attachments,
+            ..wgpu::RenderPassDescriptor::default()
+        });
     }
 
     /// Which pictures there are.

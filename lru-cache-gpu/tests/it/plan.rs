@@ -2,7 +2,7 @@
 
 use gpu_primitives::memory::Category;
 use lru_cache_gpu::wgpu::Limits;
-use lru_cache_gpu::{CachePlan, MAX_PAGES, SLOT_BYTES};
+use lru_cache_gpu::{CachePlan, CacheRoom, MAX_PAGES, SLOT_BYTES};
 
 use crate::harness::{OnGpu, plan};
 
@@ -44,7 +44,13 @@ fn every_buffer_fits_a_binding() {
         let limits = binding(bytes);
         let blocks = bytes / 4;
         for most_pages in 1..=MAX_PAGES {
-            let plan = CachePlan::fit_beside(blocks, 1 << 40, &limits, most_pages, |_| 0).unwrap();
+            let plan = CachePlan::fit_beside(
+                blocks,
+                CacheRoom { most_pages, ..CacheRoom::new(1 << 40) },
+                &limits,
+                |_| 0,
+            )
+            .unwrap();
             assert!(u64::from(plan.page_count()) <= most_pages);
             assert!(plan.pages().all(|slots| slots * SLOT_BYTES <= bytes));
             assert!(plan.directory_bytes() <= bytes, "{bytes} per binding");
@@ -52,7 +58,7 @@ fn every_buffer_fits_a_binding() {
         }
         assert_eq!(
             CachePlan::fit(blocks, 1 << 40, &limits),
-            CachePlan::fit_beside(blocks, 1 << 40, &limits, MAX_PAGES, |_| 0)
+            CachePlan::fit_beside(blocks, CacheRoom::new(1 << 40), &limits, |_| 0)
         );
     }
 }
@@ -62,7 +68,7 @@ fn memory_beside_the_cache_counts_towards_the_bytes() {
     let limits = Limits::default();
     let beside = |slots: u64| 1000 + 12 * slots;
     for bytes in [50_000, 1 << 20, 10_000_000] {
-        let plan = CachePlan::fit_beside(5000, bytes, &limits, MAX_PAGES, beside).unwrap();
+        let plan = CachePlan::fit_beside(5000, CacheRoom::new(bytes), &limits, beside).unwrap();
         assert!(plan.bytes() + beside(plan.slots()) <= bytes);
         let alone = CachePlan::fit(5000, bytes, &limits).unwrap();
         assert!(plan.slots() < alone.slots() || plan.slots() == 5000);
@@ -71,7 +77,7 @@ fn memory_beside_the_cache_counts_towards_the_bytes() {
         assert!(plan.slots() == 5000 || (one_more.slots() > plan.slots() && needed > bytes));
     }
     let minimum = CachePlan::minimum_bytes(5000) + beside(8);
-    let fit = |bytes| CachePlan::fit_beside(5000, bytes, &limits, MAX_PAGES, beside);
+    let fit = |bytes| CachePlan::fit_beside(5000, CacheRoom::new(bytes), &limits, beside);
     assert_eq!(fit(minimum).unwrap().slots(), 8);
     assert!(fit(minimum - 1).is_err());
 }

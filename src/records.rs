@@ -1,0 +1,199 @@
+//! What comes back from the GPU after every pass, and the report made from it.
+
+use bytemuck::{Pod, Zeroable};
+use gpu_primitives::memory::Ledger;
+use gpu_primitives::readback::ReadbackRing;
+use wavefront::Statistics;
+use web_time::Instant;
+
+use crate::schedule::Schedule;
+use crate::timing::Timer;
+use crate::{PassReport, wgpu};
+
+/// Passes that may be in flight.
+pub(crate) const PASSES_IN_FLIGHT: usize = 2;
+
+/// What is read back after a pass.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+struct PassRecord {
+    /// GPU clock ticks at the pass's begin and end, two words each; 0 without timestamps.
+    ticks: [u32; 4],
+    /// What follows is there after loading only.
+    rays: wavefront::Counters,
+    /// What follows is there with a cache only.
+    cache: lru_cache_gpu::Counters,
+    /// The cache's counters when the frame started.
+    cache_before: lru_cache_gpu::Counters,
+    statistics: Statistics,
+}
+
+/// Bytes of a [`PassRecord`].
+pub(crate) const READBACK_BYTES: u64 = size_of::<PassRecord>() as u64 + PROFILE_BYTES;
+
+/// Bytes of the timestamps that are read back with a pass, and of the buffer that they come from.
+#[cfg(feature = "wgpu-profiler")]
+const PROFILE_BYTES: u64 = gpu_primitives::profile::Profiler::BYTES;
+#[cfg(not(feature = "wgpu-profiler"))]
+const PROFILE_BYTES: u64 = 0;
+
+/// Bytes of the resolved timestamps and, with a cache, of the counters since the frame's start.
+pub(crate) const CONTROL_BYTES: u64 =
+    lru_cache_gpu::Counters::BYTES.1 + Timer::BYTES + PROFILE_BYTES;
+
+/// What the host knows of a pass when it is recorded.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct PassInfo {
+    pub(crate) frame: u64,
+    /// Number within the frame; 0 for a pass that loads.
+    pub(crate) pass: u32,
+    pub(crate) rounds: u32,
+    pub(crate) pixels: u32,
+    pub(crate) dispatches: u32,
+    /// When recording began.
+    pub(crate) begin: Instant,
+    pub(crate) cpu_ms: f64,
+}
+
+/// A pass whose counters have not come back yet.
+#[derive(Debug, Clone, Copy)]
+struct Submitted {
+    tag: u64,
+    info: PassInfo,
+    /// Bytes of the pass's [`PassRecord`] in what is read back.
+    record_bytes: usize,
+}
+
+/// The passes in flight and the newest report.
+#[derive(Debug)]
+pub(crate) struct PassRecords {
+    readback: ReadbackRing,
+    timer: Timer,
+    #[cfg(feature = "wgpu-profiler")]
+    profile: crate::timing::Profile,
+    submitted: Vec<Submitted>,
+    pub(crate) schedule: Schedule,
+    last_report_at: Instant,
+    pub(crate) report: PassReport,
+}
+
+impl PassRecords {
+    pub(crate) fn new(device: &wgpu::Device, queue: &wgpu::Queue, ledger: &Ledger) -> Self {
+        let label = "progressive-iso.readback";
+        Self {
+            readback: ReadbackRing::new(ledger, label, READBACK_BYTES, PASSES_IN_FLIGHT),
+            timer: Timer::new(device, queue, ledger),
+            #[cfg(feature = "wgpu-profiler")]
+            profile: crate::timing::Profile::new(device, queue, ledger),
+            submitted: Vec::new(),
+            schedule: Schedule::default(),
+            last_report_at: Instant::now(),
+            report: PassReport::default(),
+        }
+    }
+
+    /// Whether another pass may be recorded.
+    pub(crate) fn has_room(&self) -> bool {
+        self.readback.has_room()
+    }
+
+    /// Whether the GPU has finished every pass that was recorded.
+    pub(crate) fn is_idle(&self) -> bool {
+        self.readback.in_flight() == 0
+    }
+
+    /// Records the begin of a pass.
+    pub(crate) fn record_begin(&self, encoder: &mut wgpu::CommandEncoder) {
+        self.timer.record_begin(encoder);
+        #[cfg(feature = "wgpu-profiler")]
+        self.profile.begin();
+    }
+
+    /// Records the end of a pass, up to its read-back.
+    pub(crate) fn record_end(&mut self, encoder: &mut wgpu::CommandEncoder) {
+        #[cfg(feature = "wgpu-profiler")]
+        self.profile.end(encoder);
+        self.timer.record_end(encoder);
+    }
+
+    /// Records reading a pass's counters back: parts (buffer, byte offset, bytes) in the order of a
+    /// [`PassRecord`]'s fields.
+    pub(crate) fn record_readback(
+        &mut self,
+        device: &wgpu::Device,
+        encoder: &mut wgpu::CommandEncoder,
+        counters: &[(&wgpu::Buffer, u64, u64)],
+        info: PassInfo,
+    ) {
+        let mut parts = vec![self.timer.part()];
+        parts.extend(counters);
+        let record_bytes = parts.iter().map(|part| part.2 as usize).sum();
+        let tag = self.submitted.last().map_or(1, |s| s.tag + 1);
+        #[cfg(feature = "wgpu-profiler")]
+        parts.extend(self.profile.part());
+        if self.readback.record(device, encoder, &parts, tag) {
+            self.submitted.push(Submitted { tag, info, record_bytes });
+        }
+    }
+
+    /// Takes in what the GPU has finished.
+    pub(crate) fn collect(&mut self) {
+        while let Some((tag, bytes)) = self.readback.take() {
+            let Some(position) = self.submitted.iter().position(|s| s.tag == tag) else {
+                continue;
+            };
+            let submitted = self.submitted[position];
+            // Tags count on from the last one, so that one always stays.
+            self.submitted.drain(..position);
+            let mut record = PassRecord::zeroed();
+            let length = submitted.record_bytes.min(bytes.len()).min(size_of::<PassRecord>());
+            bytemuck::bytes_of_mut(&mut record)[..length].copy_from_slice(&bytes[..length]);
+            #[cfg(feature = "wgpu-profiler")]
+            self.profile.take(&bytes[length..]);
+            if submitted.info.pass > 0 {
+                self.take(submitted.info, &record);
+            }
+        }
+    }
+
+    /// What a pass took, by the GPU's clock or, without one, from its recording or the report before on.
+    fn take_time(&mut self, info: PassInfo, record: &PassRecord) {
+        let now = Instant::now();
+        let elapsed = now.duration_since(info.begin.max(self.last_report_at));
+        self.last_report_at = now;
+        let gpu_ms = self.timer.milliseconds(record.ticks);
+        let ms = gpu_ms.unwrap_or(1e3 * elapsed.as_secs_f64());
+        let same_frame = self.report.frame == info.frame;
+        let rounds_before = if same_frame { self.report.rounds } else { 0 };
+        self.schedule.take(info.rounds.saturating_sub(rounds_before), ms);
+    }
+
+    fn take(&mut self, info: PassInfo, record: &PassRecord) {
+        self.take_time(info, record);
+        let since = |now: u32, before: u32| now.wrapping_sub(before);
+        let report = &mut self.report;
+        report.frame = info.frame;
+        report.pass = info.pass;
+        report.rounds = info.rounds;
+        report.dispatches = info.dispatches;
+        report.cpu_ms = info.cpu_ms;
+        report.gpu_ms = self.timer.milliseconds(record.ticks);
+        report.rays = info.pixels;
+        report.entered_rays = record.rays.entered;
+        report.active_rays = record.rays.active;
+        report.hits = record.rays.hits;
+        report.blocks_used = since(record.cache.used, record.cache_before.used);
+        report.blocks_requested = since(record.cache.requested, record.cache_before.requested);
+        report.blocks_decoded = since(record.cache.decoded, record.cache_before.decoded);
+        report.blocks_evicted = since(record.cache.evicted, record.cache_before.evicted);
+        report.speculation = record.statistics.speculation;
+        report.ray_block_pairs = record.statistics.pairs;
+        report.visible_blocks = record.statistics.visible_blocks;
+    }
+
+    /// GPU times of the stages in the newest pass that came back.
+    #[cfg(feature = "wgpu-profiler")]
+    pub(crate) fn stage_times(&self) -> &[gpu_primitives::profile::StageTime] {
+        self.profile.newest()
+    }
+}
