@@ -230,13 +230,15 @@ impl Scene<'_> {
         let beside = |slots| self.strategy.bytes(slots);
         let smallest = CachePlan::minimum_bytes(blocks) + beside(CachePlan::least_slots(blocks));
         let mut parts = self.parts();
-        self.check_budget(&parts, smallest)?;
+        let decode = Part::new("decode", When::Rendering, DecodeBuffers::BYTES, "parameters");
+        self.check_budget(&parts, decode.bytes + smallest)?;
         let room = CacheRoom {
-            bytes: self.options.budget_bytes - bytes(&parts, When::Rendering),
+            bytes: self.options.budget_bytes - bytes(&parts, When::Rendering) - decode.bytes,
             most_pages: self.strategy.most_slot_pages(),
             most_slots: self.most_slots(),
         };
         let cache = CachePlan::fit_beside(blocks, room, self.limits, beside)?;
+        parts.push(decode);
         parts.push(self.strategy.part(cache.slots()));
         parts.push(cache_part(&cache, blocks));
         parts.push(Part::left_out("resident volume", "decoded on demand"));
@@ -251,6 +253,7 @@ impl Scene<'_> {
         let resident = ResidentPlan::new(blocks, self.limits, self.strategy.most_slot_pages())?;
         let mut parts = self.parts();
         parts.push(self.strategy.part(blocks));
+        parts.push(Part::left_out("decode", "every block is resident"));
         parts.push(Part::left_out("cache", "every block is resident"));
         let why = format!("{blocks} blocks, decoded at load");
         parts.push(Part::new("resident volume", When::Always, resident.bytes(), why));
@@ -308,7 +311,7 @@ impl Scene<'_> {
         parts
     }
 
-    fn volume_parts(&self) -> [Part; 6] {
+    fn volume_parts(&self) -> [Part; 5] {
         let Self { payload, macrocell, .. } = self;
         let masks = macrocell.mask_bytes() + Masks::params_bytes(macrocell);
         let scratch =
@@ -329,7 +332,6 @@ impl Scene<'_> {
                 Part::left_out("third level", "fewer than 512 coarse cells")
             },
             Part::new("range scratch", When::Loading, scratch, "extrema of 33^3 blocks"),
-            Part::new("decode", When::Rendering, DecodeBuffers::BYTES, "parameters"),
         ]
     }
 

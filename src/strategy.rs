@@ -2,7 +2,7 @@
 
 use wavefront::{RunAhead, SampleLayout, Strategy};
 
-use crate::plan::{Part, When};
+use crate::plan::Part;
 use crate::{Error, TraversalStrategy, wgpu};
 
 /// What the chosen strategy allocates.
@@ -90,7 +90,7 @@ impl StrategyPlan {
             #[cfg(feature = "block-sorted")]
             Self::BlockSorted(options, plan) => {
                 let why = format!("strategy BlockSorted, start factor {}", options.start_factor);
-                Part::new("block pairs", When::Rendering, plan.bytes(slots), why)
+                Part::new("block pairs", crate::When::Rendering, plan.bytes(slots), why)
             }
         }
     }

@@ -16,7 +16,7 @@ use gpu_testkit::gpu::{device, read_buffer, submit_and_wait};
 use mesh::{Mesh, Vertex};
 use progressive_iso::{
     Camera, CompressedVolume, DrawTarget, Frame, FrameOptions, Outputs, PixelStatus,
-    ProgressiveIsoRenderer, RendererOptions, Shading, wgpu,
+    ProgressiveIsoRenderer, RendererOptions, Residency, Shading, wgpu,
 };
 use volumes::SphereDistance;
 use wgpu::{CompareFunction, TextureFormat};
@@ -157,6 +157,8 @@ impl Host {
             outputs: Outputs { status: true, ..Default::default() },
             draw_target: Some(target),
             capture: true,
+            // A resident volume has no pictures with finished and unfinished pixels.
+            residency: Residency::Cached,
             ..Default::default()
         };
         let mut renderer = ProgressiveIsoRenderer::new(&device, &queue, volume, options).unwrap();

@@ -248,7 +248,10 @@ fn reads_raw_samples_of_a_given_type() {
 fn stops_early_on_request() {
     let folder = folder("stop");
     let report = path(&folder, "r.json");
-    succeed(&["--volume", "gyroid:24", "--stop", "0", "--size", "20x20", "--report", &report]);
+    // A strategy that takes more than one pass, however small the volume is.
+    let slow = ["--strategy", "block-sorted", "--no-speculation"];
+    let stopped = ["--volume", "gyroid:24", "--stop", "0", "--size", "20x20", "--report", &report];
+    succeed(&[&stopped[..], &slow].concat());
     let report = read_json(&report);
     assert_eq!(report["passes"].as_array().unwrap().len(), 1);
     assert_eq!(report["complete"], false);
