@@ -47,7 +47,10 @@ pub(crate) struct PassInfo {
     pub(crate) frame: u64,
     /// Number within the frame; 0 for a pass that loads.
     pub(crate) pass: u32,
+    /// Rounds recorded for the frame up to the pass, which may go on after the frame is complete.
     pub(crate) rounds: u32,
+    /// Lists of active rays made before the first round.
+    pub(crate) lists_at_start: u32,
     pub(crate) pixels: u32,
     pub(crate) dispatches: u32,
     /// When recording began.
@@ -165,7 +168,8 @@ impl PassRecords {
         let ms = gpu_ms.unwrap_or(1e3 * elapsed.as_secs_f64());
         let same_frame = self.report.frame == info.frame;
         let rounds_before = if same_frame { self.report.rounds } else { 0 };
-        self.schedule.take(info.rounds.saturating_sub(rounds_before), ms);
+        let rounds = record.rays.lists.saturating_sub(info.lists_at_start);
+        self.schedule.take(rounds.saturating_sub(rounds_before), ms);
     }
 
     fn take(&mut self, info: PassInfo, record: &PassRecord) {
@@ -174,7 +178,7 @@ impl PassRecords {
         let report = &mut self.report;
         report.frame = info.frame;
         report.pass = info.pass;
-        report.rounds = info.rounds;
+        report.rounds = record.rays.lists.saturating_sub(info.lists_at_start).min(info.rounds);
         report.dispatches = info.dispatches;
         report.cpu_ms = info.cpu_ms;
         report.gpu_ms = self.timer.milliseconds(record.ticks);

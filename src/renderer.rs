@@ -310,9 +310,9 @@ impl ProgressiveIsoRenderer {
         begin: Instant,
         dispatches: u32,
     ) {
-        let counters = match &self.phase {
-            Phase::Rendering(rendering) => rendering.counters(),
-            _ => Vec::new(),
+        let (counters, lists_at_start) = match &self.phase {
+            Phase::Rendering(rendering) => (rendering.counters(), rendering.lists_at_start()),
+            _ => (Vec::new(), 0),
         };
         let (frame, pass, rounds) = match &self.frame {
             Some(state) if state.started => (state.number, state.passes, state.rounds),
@@ -321,7 +321,8 @@ impl ProgressiveIsoRenderer {
         let [width, height] = self.options.size;
         let cpu_ms = begin.elapsed().as_secs_f64() * 1e3;
         let pixels = width * height;
-        let info = PassInfo { frame, pass, rounds, pixels, dispatches, begin, cpu_ms };
+        let info =
+            PassInfo { frame, pass, rounds, lists_at_start, pixels, dispatches, begin, cpu_ms };
         self.records.record_readback(device, encoder, &counters, info);
     }
 

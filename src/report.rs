@@ -18,7 +18,7 @@ pub struct PassReport {
     pub newest_frame: u64,
     /// The pass described, counted from 1 within its frame; 0 when none has finished yet.
     pub pass: u32,
-    /// Rounds of the frame up to and including that pass.
+    /// Rounds of the frame up to and including that pass; those that found no ray active do not count.
     pub rounds: u32,
     /// Pixels, hence rays.
     pub rays: u32,

@@ -159,6 +159,11 @@ impl Rendering {
         });
     }
 
+    /// Lists of active rays made before the first round.
+    pub(crate) fn lists_at_start(&self) -> u32 {
+        self.rounds.lists_at_start()
+    }
+
     /// What is read back after a pass: parts (buffer, byte offset, bytes).
     pub(crate) fn counters(&self) -> Vec<(&wgpu::Buffer, u64, u64)> {
         let (offset, bytes) = wavefront::Counters::BYTES;

@@ -54,7 +54,10 @@ fn both_residencies_make_the_same_picture() {
             // Again, when nothing is left to load: one round.
             let again = gpu.finish(&mut renderer, &frame);
             same_picture(&again, &cached).unwrap();
-            assert_eq!((renderer.poll_report().pass, renderer.poll_report().rounds), (1, 1));
+            let report = renderer.poll_report();
+            // None where the volume has no cell.
+            let rounds = u32::from(dims.iter().all(|&n| n > 1));
+            assert_eq!((report.pass, report.rounds), (1, rounds), "{name}");
         }
     }
 }

@@ -5,7 +5,7 @@
 #import scan_group
 
 @group(0) @binding(0) var<uniform> frame: FrameParams;
-@group(0) @binding(1) var<storage, read_write> rays: array<u32>;
+@group(0) @binding(1) var<storage, read_write> rays: array<atomic<u32>>;
 @group(0) @binding(2) var<storage, read_write> sums: array<u32>;
 #ifdef LIST_FILL
 // Arguments of a dispatch over the listed rays, and of LIST_SUM.
@@ -24,14 +24,17 @@ fn list_word(word: u32) -> u32 {
     if (word >= frame.ray_numbers / 32u) {
         return 0u;
     }
-    return rays[frame_active_word(frame, word * 32u)];
+    return atomicLoad(&rays[frame_active_word(frame, word * 32u)]);
 }
 
 #ifdef LIST_FILL
+var<workgroup> was_active: u32;
+
 fn write_args(active_count: u32) {
     let listed = min(active_count, frame.list_capacity);
-    rays[RAYS_ACTIVE] = active_count;
-    rays[RAYS_LISTED] = listed;
+    atomicStore(&rays[RAYS_ACTIVE], active_count);
+    atomicStore(&rays[RAYS_LISTED], listed);
+    atomicAdd(&rays[RAYS_LISTS], 1u);
     let walk = indirect_fold((listed + 63u) / 64u);
     args[0] = walk.x;
     args[1] = walk.y;
@@ -49,9 +52,17 @@ fn main(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
+    // Without active rays the list stays as it is, whatever the arguments of this dispatch still say. Group 0 may
+    // write the word already: if it finds no active ray, there is nothing to list either.
+    if (lane == 0u) {
+        was_active = atomicLoad(&rays[RAYS_ACTIVE]);
+    }
+    if (workgroupUniformLoad(&was_active) == 0u) {
+        return;
+    }
     let group = indirect_linear_group(group_id, groups);
     // Group 0, which has nothing before it, sums up everything.
-    let end = select(group, list_groups() + frame_zero(rays[RAYS_HITS]), group == 0u);
+    let end = select(group, list_groups() + frame_zero(atomicLoad(&rays[RAYS_HITS])), group == 0u);
     var part = 0u;
     for (var i = lane; i < end; i += SCAN_LANES) {
         part += sums[i];
@@ -65,7 +76,8 @@ fn main(
     var at = select(summed, 0u, group == 0u) + scan_group(lane, countOneBits(bits)).before;
     let capacity = frame.list_capacity + frame_zero(summed);
     while (bits != 0u && at < capacity) {
-        rays[frame_list_word(frame, at)] = word * 32u + countTrailingZeros(bits);
+        let number = word * 32u + countTrailingZeros(bits);
+        atomicStore(&rays[frame_list_word(frame, at)], number);
         bits &= bits - 1u;
         at++;
     }

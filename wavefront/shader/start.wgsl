@@ -57,4 +57,7 @@ fn main(
         atomicStore(&rays[frame_active_word(frame, id)], bits);
         atomicAdd(&rays[RAYS_ENTERED], countOneBits(bits));
     }
+    if (id == 0u) {
+        atomicStore(&rays[RAYS_ACTIVE], 1u); // the first list is to be made
+    }
 }

@@ -374,6 +374,11 @@ impl Rounds for BlockSortedRounds {
         stage.record_resolve(encoder, rays);
     }
 
+    /// One more after the empty-space step.
+    fn lists_at_start(&self) -> u32 {
+        2
+    }
+
     fn statistics(&self) -> Vec<(&wgpu::Buffer, u64, u64)> {
         vec![(&*self.pairs, 0, 8), (&*self.visible, self.visible_count_offset, 4)]
     }

@@ -52,6 +52,10 @@ pub struct Counters {
     pub hits: u32,
     /// Active rays that the next round takes.
     pub listed: u32,
+    /// Lists of active rays made so far: one by every round that had any, and those of
+    /// [`crate::Rounds::lists_at_start`].
+    pub lists: u32,
+    pad: [u32; 3],
 }
 
 impl Counters {

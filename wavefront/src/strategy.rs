@@ -51,6 +51,11 @@ pub trait Rounds: Debug {
         make_resident: MakeResident<'_>,
     );
 
+    /// Lists of active rays made before the first round.
+    fn lists_at_start(&self) -> u32 {
+        1
+    }
+
     /// Where the strategy's [`Statistics`] are, if it has any: parts (buffer, byte offset, bytes)
     /// in the order of the fields.
     fn statistics(&self) -> Vec<(&wgpu::Buffer, u64, u64)>;

@@ -94,7 +94,8 @@ const RAYS_ACTIVE: u32 = 0u;   // active rays
 const RAYS_ENTERED: u32 = 1u;  // rays that enter the volume
 const RAYS_HITS: u32 = 2u;     // hits shaded so far
 const RAYS_LISTED: u32 = 3u;   // length of the active list
-const RAYS_HEADER: u32 = 4u;
+const RAYS_LISTS: u32 = 4u;    // lists made so far in the frame; none is made when no ray is active
+const RAYS_HEADER: u32 = 8u;
 
 // The word that holds the active bit of a ray, which is its number's lowest five bits.
 fn frame_active_word(frame: FrameParams, ray: u32) -> u32 {
