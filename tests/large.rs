@@ -1,6 +1,7 @@
 //! Streams that need more bits than a u32 counts and more bytes than a binding holds.
 
 #![allow(clippy::unwrap_used, reason = "a failed set-up fails the test")]
+#![allow(clippy::print_stdout, reason = "plans and reports, for people who look")]
 
 use gpu_testkit::gpu;
 use progressive_iso::{
