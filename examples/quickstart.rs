@@ -11,7 +11,8 @@ use std::time::Instant;
 
 use clap::Parser;
 use progressive_iso::{
-    Camera, CompressedVolume, Frame, FrameOptions, ProgressiveIsoRenderer, RendererOptions, Shading,
+    Camera, CompressedVolume, Frame, FrameOptions, ProgressiveIsoRenderer, RendererOptions,
+    Residency, Shading,
 };
 use support::{Failure, Gpu, PassEntry, Report};
 
@@ -51,6 +52,8 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         size: [960, 720],
         budget_bytes: arguments.budget << 20,
         capture: true,
+        // As for a volume larger than memory, and in small steps, so that there are passes to look at.
+        residency: Residency::Cached,
         ..Default::default()
     };
     let mut renderer = ProgressiveIsoRenderer::new(&gpu.device, &gpu.queue, volume, options)?;
@@ -77,6 +80,8 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         isovalues: vec![isovalue],
         options: FrameOptions {
             shading: Shading { unfinished: support::UNFINISHED, ..Default::default() },
+            rounds_per_pass: 1,
+            look_ahead: 1,
             ..Default::default()
         },
     })?;

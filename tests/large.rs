@@ -84,6 +84,6 @@ fn eight_billion_voxels_within_two_gigabytes() {
     let volume = CompressedVolume::try_from(&stream).unwrap();
     drop(stream);
     let expected = render(volume.clone(), isovalue, options(2_000_000_000));
-    let capped = RendererOptions { most_slots: Some(4096), ..options(2_000_000_000) };
+    let capped = RendererOptions { most_slots: Some(16_384), ..options(2_000_000_000) };
     assert!(render(volume, isovalue, capped) == expected);
 }

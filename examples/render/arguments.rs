@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use progressive_iso::{BlockSortedOptions, TraversalStrategy};
+use progressive_iso::{BlockSortedOptions, Residency, TraversalStrategy};
 use volume_io::SampleType;
 
 use crate::problem::Problem;
@@ -64,13 +64,13 @@ pub struct Arguments {
     /// BlockSorted: every ray goes one block at a time
     #[arg(long)]
     pub no_speculation: bool,
-    /// Rounds of walking and decoding per submission
-    #[arg(long, value_name = "N", default_value_t = 1,
+    /// Most rounds of walking and decoding per submission; fewer where they take long
+    #[arg(long, value_name = "N", default_value_t = 8,
         value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub rounds_per_pass: u32,
-    /// RunAhead: active blocks that a ray requests when it stops, the missing one included; more need fewer
-    /// passes and decode more
-    #[arg(long, value_name = "N", default_value_t = 1,
+    /// RunAhead: active blocks that a ray requests when it first stops, the missing one included; more need
+    /// fewer passes and decode more, 1 means none ahead, ever
+    #[arg(long, value_name = "N", default_value_t = 2,
         value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub look_ahead: u32,
     /// Stops at this finished share of the rays that enter the volume, 0 to 1
@@ -171,6 +171,29 @@ pub struct SceneOptions {
     #[arg(long, value_name = "MiB", default_value_t = 256,
         value_parser = clap::value_parser!(u64).range(1..=1 << 24))]
     pub budget: u64,
+    /// What is kept of the decoded volume
+    #[arg(long, value_enum, default_value_t = Kept::Auto)]
+    pub residency: Kept,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum Kept {
+    /// All of it where the budget allows that, else what rays see
+    Auto,
+    /// What rays see, in a cache
+    Cached,
+    /// All of it
+    Full,
+}
+
+impl From<Kept> for Residency {
+    fn from(kept: Kept) -> Self {
+        match kept {
+            Kept::Auto => Self::Auto,
+            Kept::Cached => Self::Cached,
+            Kept::Full => Self::Full,
+        }
+    }
 }
 
 /// Where the viewer is.

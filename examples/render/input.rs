@@ -131,6 +131,7 @@ impl Input {
         let options = RendererOptions {
             size: scene.size,
             budget_bytes: scene.budget << 20,
+            residency: scene.residency.into(),
             capture: true,
             ..Default::default()
         };

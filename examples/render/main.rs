@@ -86,6 +86,7 @@ fn render(arguments: &Arguments, volume: &str) -> Result<(), Problem> {
         outputs: Outputs { depth: arguments.depth.is_some(), ..Default::default() },
         capture,
         strategy,
+        residency: arguments.scene.residency.into(),
         ..Default::default()
     };
     let begin = Instant::now();
@@ -95,6 +96,7 @@ fn render(arguments: &Arguments, volume: &str) -> Result<(), Problem> {
         shading: Shading { unfinished: support::UNFINISHED, ..Default::default() },
         rounds_per_pass: arguments.rounds_per_pass,
         look_ahead: arguments.look_ahead,
+        ..Default::default()
     };
     renderer.set_frame(&Frame { camera, isovalues: vec![isovalue], options })?;
     let passes = run_passes(&gpu, &mut renderer, arguments.stop)?;
