@@ -145,11 +145,6 @@ fn zfp_read_plane(reader: ptr<function, ZfpReader>) -> vec2<u32> {
     return plane;
 }
 
-// Signed value of 32 negabinary digits.
-fn zfp_signed(digits: u32) -> i32 {
-    return bitcast<i32>((digits ^ ZFP_NEGABINARY) - ZFP_NEGABINARY);
-}
-
 // Undoes the transform of four values.
 fn zfp_invert_lift(v: vec4<i32>) -> vec4<i32> {
     var a = v.x;

@@ -42,19 +42,39 @@ fn zfp_group_leave_out(block: u32) {
     zfp_headers[block] = 0u;
 }
 
-// Negabinary digits of the four samples of a line along z.
-fn zfp_group_gather(block: u32, line: u32) -> vec4<i32> {
-    let coefficients = (vec4<u32>(ZFP_COEFFICIENTS[line]) >> vec4<u32>(0u, 8u, 16u, 24u)) & vec4<u32>(63u);
-    let shift = coefficients & vec4<u32>(31u);
-    let upper = coefficients >= vec4<u32>(32u);
+// Two lines of four samples along z.
+struct ZfpLines {
+    a: vec4<i32>,
+    b: vec4<i32>,
+}
+
+// The samples whose negabinary digits are in the planes, transformed: lines `line` and `line` + 8 of a block.
+fn zfp_group_gather(block: u32, line: u32) -> ZfpLines {
+    let bytes = vec4<u32>(0u, 8u, 16u, 24u);
+    let coefficients_a = (vec4<u32>(ZFP_COEFFICIENTS[line]) >> bytes) & vec4<u32>(63u);
+    let coefficients_b = (vec4<u32>(ZFP_COEFFICIENTS[line + 8u]) >> bytes) & vec4<u32>(63u);
+    let upper_a = coefficients_a >= vec4<u32>(32u);
+    let upper_b = coefficients_b >= vec4<u32>(32u);
+    let shift_a = coefficients_a & vec4<u32>(31u);
+    let shift_b = coefficients_b & vec4<u32>(31u);
     let planes = zfp_headers[block] >> 8u;
-    var digits = vec4<u32>(0u);
+    var a = vec4<u32>(0u);
+    var b = vec4<u32>(0u);
     for (var plane = 0u; plane < planes; plane++) {
         let low = vec4<u32>(zfp_words[64u * plane + block]);
         let high = vec4<u32>(zfp_words[64u * plane + 32u + block]);
-        digits |= ((select(low, high, upper) >> shift) & vec4<u32>(1u)) << vec4<u32>(31u - plane);
+        // The planes come from the highest digit down.
+        a = (a << vec4<u32>(1u)) | ((select(low, high, upper_a) >> shift_a) & vec4<u32>(1u));
+        b = (b << vec4<u32>(1u)) | ((select(low, high, upper_b) >> shift_b) & vec4<u32>(1u));
     }
-    return bitcast<vec4<i32>>((digits ^ vec4<u32>(ZFP_NEGABINARY)) - vec4<u32>(ZFP_NEGABINARY));
+    // A shift by 32 would be a shift by 0; blocks that are not zero have a plane.
+    let rest = vec4<u32>(32u - max(planes, 1u));
+    return ZfpLines(zfp_group_signed(a << rest), zfp_group_signed(b << rest));
+}
+
+fn zfp_group_signed(digits: vec4<u32>) -> vec4<i32> {
+    let flip = vec4<u32>(ZFP_NEGABINARY);
+    return bitcast<vec4<i32>>((digits ^ flip) - flip);
 }
 
 fn zfp_group_word(block: u32, start: u32, stride: u32) -> vec4<i32> {
@@ -80,8 +100,9 @@ fn zfp_group_invert(lane: u32) {
     for (var turn = 0u; turn < 4u; turn++) {
         let block = turn * ZFP_GROUP_AT_ONCE + (lane >> 3u);
         if zfp_headers[block] != 0u {
-            lines[2u * turn] = zfp_invert_lift(zfp_group_gather(block, line));
-            lines[2u * turn + 1u] = zfp_invert_lift(zfp_group_gather(block, line + 8u));
+            let gathered = zfp_group_gather(block, line);
+            lines[2u * turn] = zfp_invert_lift(gathered.a);
+            lines[2u * turn + 1u] = zfp_invert_lift(gathered.b);
         }
     }
     workgroupBarrier();
