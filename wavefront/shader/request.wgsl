@@ -43,9 +43,10 @@ fn request(block: vec3<i32>, need: u32, leads: bool) {
 }
 
 // Active blocks that a ray requests: twice as many after every round in which it went on and missed a
-// block again, since the rays that take many rounds graze the surface.
+// block again, since the rays that take many rounds graze the surface. Not where slots are short: what is
+// fetched ahead would take the place of what is needed.
 fn look_ahead(misses: u32, least: u32) -> u32 {
-    if (frame.look_ahead == 1u) {
+    if (frame.look_ahead == 1u || lru_uses_count) {
         return least;
     }
     return min(least << (max(misses, 1u) - 1u), MOST_AHEAD);

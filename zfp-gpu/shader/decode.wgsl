@@ -37,6 +37,10 @@ fn zfp_word(index: u32) -> u32 {
 // Slot of each of the group's jobs, or NO_SLOT.
 var<workgroup> job_slots: array<u32, ZFP_GROUP_BLOCKS>;
 
+// Whether any of the group's jobs belongs to this page.
+var<workgroup> any_job: atomic<u32>;
+var<workgroup> has_jobs: u32;
+
 const NO_SLOT: u32 = 0xffffffffu;
 
 // First phase: one invocation reads the planes of a job's block.
@@ -53,6 +57,7 @@ fn read_job(index: u32, lane: u32) {
         return;
     }
     job_slots[lane] = job.y;
+    atomicStore(&any_job, 1u);
     zfp_group_read(lane, zfp_locate(page, block), page.bits_per_block);
 }
 
@@ -62,10 +67,21 @@ fn decode(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
+    if lane == 0u {
+        atomicStore(&any_job, 0u);
+    }
+    workgroupBarrier();
     if lane < ZFP_GROUP_BLOCKS {
         read_job(indirect_linear_group(group, groups) * ZFP_GROUP_BLOCKS + lane, lane);
     }
     workgroupBarrier();
+    if lane == 0u {
+        has_jobs = atomicLoad(&any_job);
+    }
+    // Where a volume has many pages, most groups have nothing to do in most of them.
+    if workgroupUniformLoad(&has_jobs) == 0u {
+        return;
+    }
     zfp_group_invert(lane);
     for (var turn = 0u; turn < 4u; turn++) {
         let block = turn * ZFP_GROUP_AT_ONCE + (lane >> 3u);

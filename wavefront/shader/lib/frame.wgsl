@@ -63,7 +63,7 @@ const RAY_ACTIVE: u32 = 0u;          // waits for its block, or has not started
 const RAY_HIT: u32 = 0x40000000u;    // has a hit in its block, not shaded yet
 const RAY_DONE: u32 = 0x80000000u;   // final
 const RAY_STATUS: u32 = 0xc0000000u;
-const RAY_MOST_MISSES: u32 = 5u; // further look-ahead is no use
+const RAY_MOST_MISSES: u32 = 6u; // more would look too far ahead
 
 // A block's position in a ray's state. Without a division, which is slow.
 fn frame_pack(frame: FrameParams, block: vec3<i32>) -> u32 {
