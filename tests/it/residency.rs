@@ -1,8 +1,8 @@
 //! A volume that is resident as a whole makes the same pictures, in one pass, and needs no cache.
 
 use progressive_iso::{
-    BlockSortedOptions, Capture, Category, Error, ProgressiveIsoRenderer, RendererOptions,
-    Residency, ScenePlan, TraversalStrategy, wgpu,
+    BlockSortedOptions, Camera, Capture, Category, Error, Outputs, PixelStatus,
+    ProgressiveIsoRenderer, RendererOptions, Residency, ScenePlan, TraversalStrategy, wgpu,
 };
 
 use crate::invariance::same_picture;
@@ -150,4 +150,30 @@ fn a_picture_that_no_longer_fits_beside_the_volume_moves_it_into_a_cache() {
     }
     let found = gpu.finish(&mut renderer, &frame);
     same_picture(&found, &expected).unwrap();
+}
+
+/// The list of active rays holds 2^21: the others wait for the next round, and none is forgotten.
+#[test]
+fn pictures_of_more_rays_than_the_list_holds_are_finished() {
+    let gpu = Gpu::new();
+    let size = [2100, 1000];
+    let scene = Scene::generated("gyroid", [12, 13, 11], 9.0);
+    let outputs = Outputs { status: true, ..Outputs::default() };
+    let options = RendererOptions { size, outputs, ..with(Residency::Full) };
+    let mut renderer = gpu.renderer(&scene, options);
+    // From inside, so that every ray enters the volume.
+    let mut frame = scene.frame(scene.orbit(30.0, 20.0, size));
+    let centre = [5.5, 6.0, 5.0];
+    let aspect = f64::from(size[0]) / f64::from(size[1]);
+    let up = [0.0, 1.0, 0.0];
+    frame.camera = Camera::perspective(centre, [9.0, 6.5, 5.5], up, 60.0, aspect, 1e-3, 1e3);
+    gpu.finish(&mut renderer, &frame);
+    let picture = gpu.finish(&mut renderer, &frame);
+    let report = renderer.poll_report();
+    assert_eq!(report.entered_rays, size[0] * size[1]);
+    assert_eq!(report.rounds, 2, "one for the list's rays, one for the rest");
+    let status = picture.status.unwrap();
+    let of = |wanted| status.iter().filter(|&&s| s == wanted).count() as u32;
+    assert_eq!(of(PixelStatus::Unfinished), 0);
+    assert!(of(PixelStatus::Hit) == report.hits && report.hits > 1_000_000, "{report:?}");
 }
