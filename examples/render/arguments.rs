@@ -69,10 +69,9 @@ pub struct Arguments {
         value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub rounds_per_pass: u32,
     /// RunAhead: active blocks that a ray requests when it first stops, the missing one included; more need
-    /// fewer passes and decode more, 1 means none ahead, ever
-    #[arg(long, value_name = "N", default_value_t = 2,
-        value_parser = clap::value_parser!(u32).range(1..=1024))]
-    pub look_ahead: u32,
+    /// fewer passes and decode more, 1 means none ahead, ever [default: 2]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub look_ahead: Option<u32>,
     /// Stops at this finished share of the rays that enter the volume, 0 to 1
     #[arg(long, value_name = "SHARE", default_value_t = 1.0, value_parser = share)]
     pub stop: f64,
@@ -119,7 +118,9 @@ impl Arguments {
             Strategy::RunAhead if self.start_factor != 1 => refuse("--start-factor", "run-ahead"),
             Strategy::RunAhead if self.no_speculation => refuse("--no-speculation", "run-ahead"),
             Strategy::RunAhead => Ok(TraversalStrategy::RunAhead),
-            Strategy::BlockSorted if self.look_ahead != 1 => refuse("--look-ahead", "block-sorted"),
+            Strategy::BlockSorted if self.look_ahead.is_some() => {
+                refuse("--look-ahead", "block-sorted")
+            }
             Strategy::BlockSorted => Ok(TraversalStrategy::BlockSorted(BlockSortedOptions {
                 start_factor: self.start_factor,
                 speculation: !self.no_speculation,

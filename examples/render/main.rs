@@ -92,12 +92,14 @@ fn render(arguments: &Arguments, volume: &str) -> Result<(), Problem> {
     let begin = Instant::now();
     let mut renderer = ProgressiveIsoRenderer::new(&gpu.device, &gpu.queue, volume, options)?;
     let setup_ms = begin.elapsed().as_secs_f64() * 1e3;
-    let options = FrameOptions {
+    let mut options = FrameOptions {
         shading: Shading { unfinished: support::UNFINISHED, ..Default::default() },
         rounds_per_pass: arguments.rounds_per_pass,
-        look_ahead: arguments.look_ahead,
         ..Default::default()
     };
+    if let Some(blocks) = arguments.look_ahead {
+        options.look_ahead = blocks;
+    }
     renderer.set_frame(&Frame { camera, isovalues: vec![isovalue], options })?;
     let passes = run_passes(&gpu, &mut renderer, arguments.stop)?;
     if capture {
