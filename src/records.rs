@@ -159,29 +159,30 @@ impl PassRecords {
         }
     }
 
-    /// What a pass took, by the GPU's clock or, without one, from its recording or the report before on.
-    fn take_time(&mut self, info: PassInfo, record: &PassRecord) {
+    /// Tells the schedule what a pass took that brought the frame to `rounds` rounds: by the GPU's clock
+    /// or, without one, from its recording or the report before on.
+    fn take_time(&mut self, info: PassInfo, rounds: u32, gpu_ms: Option<f64>) {
         let now = Instant::now();
         let elapsed = now.duration_since(info.begin.max(self.last_report_at));
         self.last_report_at = now;
-        let gpu_ms = self.timer.milliseconds(record.ticks);
         let ms = gpu_ms.unwrap_or(1e3 * elapsed.as_secs_f64());
         let same_frame = self.report.frame == info.frame;
         let rounds_before = if same_frame { self.report.rounds } else { 0 };
-        let rounds = record.rays.lists.saturating_sub(info.lists_at_start);
         self.schedule.take(rounds.saturating_sub(rounds_before), ms);
     }
 
     fn take(&mut self, info: PassInfo, record: &PassRecord) {
-        self.take_time(info, record);
+        let gpu_ms = self.timer.milliseconds(record.ticks);
+        let rounds = record.rays.lists.saturating_sub(info.lists_at_start);
+        self.take_time(info, rounds, gpu_ms);
         let since = |now: u32, before: u32| now.wrapping_sub(before);
         let report = &mut self.report;
         report.frame = info.frame;
         report.pass = info.pass;
-        report.rounds = record.rays.lists.saturating_sub(info.lists_at_start).min(info.rounds);
+        report.rounds = rounds.min(info.rounds);
         report.dispatches = info.dispatches;
         report.cpu_ms = info.cpu_ms;
-        report.gpu_ms = self.timer.milliseconds(record.ticks);
+        report.gpu_ms = gpu_ms;
         report.rays = info.pixels;
         report.entered_rays = record.rays.entered;
         report.active_rays = record.rays.active;

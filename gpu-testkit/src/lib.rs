@@ -7,4 +7,7 @@ pub mod compare;
 pub mod gpu;
 pub mod image;
 pub mod layout;
+mod property;
 pub mod reference;
+
+pub use property::property;

@@ -12,7 +12,7 @@ use progressive_iso::{
 };
 use proptest::prelude::*;
 
-use crate::support::{Gpu, Scene, UNFINISHED, hit_count, options, property};
+use crate::support::{Gpu, Scene, UNFINISHED, hit_count, options};
 
 const SIZE: [u32; 2] = [96, 72];
 
@@ -213,7 +213,7 @@ fn check(gpu: &Gpu, case: &Case) -> Result<(), String> {
 }
 
 proptest! {
-    #![proptest_config(property(10))]
+    #![proptest_config(gpu_testkit::property(10))]
 
     #[test]
     fn the_picture_depends_on_the_frame_alone(case in cases()) {

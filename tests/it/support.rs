@@ -1,13 +1,10 @@
 //! What the tests share: a device, scenes, cameras, pictures.
 
-use std::hash::{BuildHasher as _, RandomState};
-
 use gpu_testkit::gpu;
 use progressive_iso::{
     Camera, Capture, CompressedVolume, Frame, FrameOptions, Outputs, PixelStatus,
     ProgressiveIsoRenderer, RendererOptions, Residency, Shading, wgpu,
 };
-use proptest::test_runner::{Config as ProptestConfig, RngSeed};
 use volume_io::ZfpVolume;
 
 /// Every picture beside the colour.
@@ -164,20 +161,4 @@ pub(crate) fn options(size: [u32; 2]) -> RendererOptions {
 
 pub(crate) fn hit_count(capture: &Capture) -> usize {
     capture.status.iter().flatten().filter(|&&s| s == PixelStatus::Hit).count()
-}
-
-/// `cases` runs, or `PROPTEST_CASES`, whose seed is printed when one fails and taken from
-/// `PROPTEST_RNG_SEED` to repeat it.
-pub(crate) fn property(cases: u32) -> ProptestConfig {
-    let mut config = ProptestConfig { failure_persistence: None, ..ProptestConfig::default() };
-    if std::env::var_os("PROPTEST_CASES").is_none() {
-        config.cases = cases;
-    }
-    let seed = match config.rng_seed {
-        RngSeed::Fixed(seed) => seed,
-        RngSeed::Random => RandomState::new().hash_one(cases),
-    };
-    println!("PROPTEST_RNG_SEED={seed}");
-    config.rng_seed = RngSeed::Fixed(seed);
-    config
 }

@@ -1,7 +1,5 @@
 //! A cache on the GPU and its twin, driven by the same uses.
 
-use std::collections::hash_map::RandomState;
-use std::hash::BuildHasher;
 use std::sync::OnceLock;
 
 use gpu_primitives::kernel::{Binding, Kernel, KernelSource};
@@ -10,8 +8,6 @@ use gpu_primitives::wgsl::{Module, compose_fixed};
 use gpu_testkit::gpu;
 use lru_cache_gpu::cpu::Cache;
 use lru_cache_gpu::{CacheBuffers, CachePlan, LruParams, Service, wgpu};
-use proptest::prelude::ProptestConfig;
-use proptest::test_runner::RngSeed;
 
 use crate::invariants;
 
@@ -318,22 +314,6 @@ pub(crate) fn assert_agree(served: &Served, after: &Cache, twin: &Served, twin_a
     if twin_after.counters().deferred == twin.before.counters().deferred {
         assert_eq!(blocks(&served.jobs), blocks(&twin.jobs), "blocks of the jobs");
     }
-}
-
-/// `cases` runs, or `PROPTEST_CASES`, whose seed is printed when one fails and taken from
-/// `PROPTEST_RNG_SEED` to repeat it.
-pub(crate) fn property(cases: u32) -> ProptestConfig {
-    let mut config = ProptestConfig { failure_persistence: None, ..ProptestConfig::default() };
-    if std::env::var_os("PROPTEST_CASES").is_none() {
-        config.cases = cases;
-    }
-    let seed = match config.rng_seed {
-        RngSeed::Fixed(seed) => seed,
-        RngSeed::Random => RandomState::new().hash_one(cases),
-    };
-    println!("PROPTEST_RNG_SEED={seed}");
-    config.rng_seed = RngSeed::Fixed(seed);
-    config
 }
 
 pub(crate) fn sorted<T: Ord>(mut list: Vec<T>) -> Vec<T> {

@@ -6,7 +6,7 @@ use lru_cache_gpu::cpu::Cache;
 use lru_cache_gpu::wgpu::Limits;
 use proptest::prelude::*;
 
-use crate::harness::{OnGpu, Op, Round, Served, assert_agree, gpu, plan, property};
+use crate::harness::{OnGpu, Op, Round, Served, assert_agree, gpu, plan};
 use crate::invariants;
 
 /// Numbers that look random (Numerical Recipes' generator).
@@ -182,7 +182,7 @@ fn more_requests_than_one_round_serves() {
 }
 
 proptest! {
-    #![proptest_config(property(12))]
+    #![proptest_config(gpu_testkit::property(12))]
 
     /// Victims and new blocks meet in few chains: each round changes most of a small directory.
     #[test]

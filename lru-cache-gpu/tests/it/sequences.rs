@@ -4,7 +4,7 @@ use lru_cache_gpu::cpu::Cache;
 use lru_cache_gpu::wgpu::Limits;
 use proptest::prelude::*;
 
-use crate::harness::{Lockstep, Op, Round, plan, play, property};
+use crate::harness::{Lockstep, Op, Round, plan, play};
 use crate::invariants;
 
 #[derive(Clone, Debug)]
@@ -54,7 +54,7 @@ fn start(sequence: &Sequence) -> Cache {
 }
 
 proptest! {
-    #![proptest_config(property(256))]
+    #![proptest_config(gpu_testkit::property(256))]
 
     #[test]
     fn every_service_keeps_its_promises(sequence in sequence(60, 24)) {
@@ -113,7 +113,7 @@ proptest! {
 }
 
 proptest! {
-    #![proptest_config(property(64))]
+    #![proptest_config(gpu_testkit::property(64))]
 
     #[test]
     fn the_gpu_and_the_twin_go_in_step(sequence in sequence(120, 6)) {

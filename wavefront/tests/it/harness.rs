@@ -1,7 +1,5 @@
 //! Pictures of samples that are all resident from the start: no stream, no cache service.
 
-use std::hash::{BuildHasher as _, RandomState};
-
 use gpu_primitives::indirect;
 use gpu_primitives::kernel::{Binding, Kernel, KernelSource};
 use gpu_primitives::memory::Ledger;
@@ -12,7 +10,6 @@ use lru_cache_gpu::{CacheBuffers, CachePlan, Service};
 use macrocell::Grid;
 use macrocell::cpu::ranges;
 use macrocell::cpu::skip::Masks;
-use proptest::test_runner::{Config as ProptestConfig, RngSeed};
 use wavefront::{
     Camera, FrameParams, FrameView, LookAhead, OutputTextures, Outputs, RayBuffers, Rays, RunAhead,
     SampleLayout, Samples, Scene, Shading, ShadingParams, Strategy, WavefrontPlan, wgpu,
@@ -279,20 +276,4 @@ pub(crate) fn along_axis(
     let up = if axis == 1 { [0.0, 0.0, 1.0] } else { [0.0, 1.0, 0.0] };
     let aspect = f64::from(WIDTH) / f64::from(height);
     Camera::orthographic(eye, center, up, f64::from(height) / per_voxel, aspect, 1.0, 1000.0)
-}
-
-/// `cases` runs, or `PROPTEST_CASES`, whose seed is printed when one fails and taken from
-/// `PROPTEST_RNG_SEED` to repeat it.
-pub(crate) fn property(cases: u32) -> ProptestConfig {
-    let mut config = ProptestConfig { failure_persistence: None, ..ProptestConfig::default() };
-    if std::env::var_os("PROPTEST_CASES").is_none() {
-        config.cases = cases;
-    }
-    let seed = match config.rng_seed {
-        RngSeed::Fixed(seed) => seed,
-        RngSeed::Random => RandomState::new().hash_one(cases),
-    };
-    println!("PROPTEST_RNG_SEED={seed}");
-    config.rng_seed = RngSeed::Fixed(seed);
-    config
 }

@@ -6,7 +6,7 @@ use wavefront::cpu::block_walk::Step;
 use wavefront::cpu::cell::{crossings, first_crossing};
 use wavefront::cpu::walk::{first_hit, steps};
 
-use crate::harness::{Field, property};
+use crate::harness::Field;
 
 fn values() -> impl Strategy<Value = f32> {
     prop_oneof![
@@ -74,7 +74,7 @@ fn all_crossings(steps: &[Step]) -> Result<Vec<([i32; 3], usize)>, String> {
 }
 
 proptest! {
-    #![proptest_config(property(10_000))]
+    #![proptest_config(gpu_testkit::property(10_000))]
 
     #[test]
     fn every_change_of_sides_is_a_hit(
