@@ -7,7 +7,10 @@ pub mod compare;
 pub mod gpu;
 pub mod image;
 pub mod layout;
+pub mod picture;
 mod property;
 pub mod reference;
+mod ssim;
+pub mod statistics;
 
 pub use property::property;
