@@ -187,6 +187,7 @@ impl PassRecords {
         report.entered_rays = record.rays.entered;
         report.active_rays = record.rays.active;
         report.hits = record.rays.hits;
+        report.open_depth_voxels = record.rays.open_depth_voxels();
         report.blocks_used = since(record.cache.used, record.cache_before.used);
         report.blocks_requested = since(record.cache.requested, record.cache_before.requested);
         report.blocks_decoded = since(record.cache.decoded, record.cache_before.decoded);

@@ -28,6 +28,13 @@ pub struct PassReport {
     pub active_rays: u32,
     /// Pixels that show the surface.
     pub hits: u32,
+    /// Bound on the depth that is still open, in voxels along the ray. A ray that is not finished has no
+    /// hit before the block that it waits for, so its first hit, if it has one, lies between there and
+    /// where it leaves the volume; this is the longest such part of any ray. It never grows within a
+    /// frame (while the picture has at most 2^21 rays: in larger ones it is the volume's diagonal until all
+    /// have started) and is 0 when the frame is complete. Computed in f32 from the numbers that the rays
+    /// themselves use; of finished pixels it says nothing, since they do not change any more.
+    pub open_depth_voxels: f32,
     /// Resident blocks that rays used in this frame, once per round each. With `blocks_requested`,
     /// the growth from pass to pass is the number of blocks that a pass needs (the published
     /// "active blocks", neighbours included).

@@ -118,12 +118,12 @@ struct Case {
 }
 
 #[cfg(not(feature = "block-sorted"))]
-fn strategies() -> impl Strategy<Value = TraversalStrategy> {
+pub(crate) fn strategies() -> impl Strategy<Value = TraversalStrategy> {
     Just(TraversalStrategy::RunAhead)
 }
 
 #[cfg(feature = "block-sorted")]
-fn strategies() -> impl Strategy<Value = TraversalStrategy> {
+pub(crate) fn strategies() -> impl Strategy<Value = TraversalStrategy> {
     let sorted = (1..9u32, any::<bool>()).prop_map(|(start_factor, speculation)| {
         TraversalStrategy::BlockSorted(BlockSortedOptions { start_factor, speculation })
     });

@@ -13,6 +13,7 @@ mod errors;
 mod invariance;
 mod left_out;
 mod memory;
+mod open_depth;
 mod published;
 mod reference;
 mod residency;

@@ -1,7 +1,7 @@
 //! A volume that is resident as a whole makes the same pictures, in one pass, and needs no cache.
 
 use progressive_iso::{
-    BlockSortedOptions, Camera, Capture, Category, Error, Outputs, PixelStatus,
+    BlockSortedOptions, Camera, Capture, Category, Error, Outputs, PassReport, PixelStatus,
     ProgressiveIsoRenderer, RendererOptions, Residency, ScenePlan, TraversalStrategy, wgpu,
 };
 
@@ -168,8 +168,17 @@ fn pictures_of_more_rays_than_the_list_holds_are_finished() {
     let up = [0.0, 1.0, 0.0];
     frame.camera = Camera::perspective(centre, [9.0, 6.5, 5.5], up, 60.0, aspect, 1e-3, 1e3);
     gpu.finish(&mut renderer, &frame);
+    // Nothing is known of the rays that the first round has no room for.
+    frame.options.rounds_per_pass = 1;
+    renderer.set_frame(&frame).unwrap();
+    let first = |_: &ProgressiveIsoRenderer, _: &PassReport| false;
+    let report = renderer.render_to_completion(&gpu.device, &gpu.queue, first).unwrap();
+    assert_eq!((report.pass, report.active_rays), (1, size[0] * size[1] - (1 << 21)));
+    let diagonal = (11.0f32 * 11.0 + 12.0 * 12.0 + 10.0 * 10.0).sqrt();
+    assert!((report.open_depth_voxels / diagonal - 1.0).abs() < 1e-6, "{report:?}");
     let picture = gpu.finish(&mut renderer, &frame);
     let report = renderer.poll_report();
+    assert_eq!(report.open_depth_voxels, 0.0);
     assert_eq!(report.entered_rays, size[0] * size[1]);
     assert_eq!(report.rounds, 2, "one for the list's rays, one for the rest");
     let status = picture.status.unwrap();

@@ -41,6 +41,8 @@ const FIRST_PAGE: u32 = 4u;
 #endif
 
 var<workgroup> hit_count: atomic<u32>;
+// Bits of a float that is not negative: they are ordered as the floats are.
+var<workgroup> open_depth: atomic<u32>;
 
 fn lru_params() -> LruParams {
     return frame.lru;
@@ -81,6 +83,15 @@ fn resolve(id: u32, state: u32) {
     outputs_write_hit(pixel, outputs_shade(normal, to_viewer), depth, normal);
 }
 
+// Length of the ray's part in which its first hit may still lie, in voxels: from where it enters the block that it
+// waits for to where it leaves the volume.
+fn open_voxels(id: u32, state: u32) -> f32 {
+    let ray = frame_ray(frame, frame_pixel(frame, id)).ray;
+    let waits = dda_entry(ray, macrocell_box(frame.grid, frame_unpack(frame, state)));
+    let leaves = dda_exit(ray, DdaBox(vec3<i32>(0), frame.grid.last_cell));
+    return max(leaves.t - waits.t, 0.0);
+}
+
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
@@ -89,6 +100,7 @@ fn main(
 ) {
     if (lane == 0u) {
         atomicStore(&hit_count, 0u);
+        atomicStore(&open_depth, 0u);
     }
     workgroupBarrier();
     let index = indirect_linear_group(group, groups) * 64u + lane;
@@ -96,7 +108,9 @@ fn main(
         let id = atomicLoad(&rays[frame_list_word(frame, index)]);
         let state = atomicLoad(&rays[RAYS_HEADER + id]);
         let status = state & RAY_STATUS;
-        if (status != RAY_ACTIVE) {
+        if (status == RAY_ACTIVE) {
+            atomicMax(&open_depth, bitcast<u32>(open_voxels(id, state)));
+        } else {
             atomicAnd(&rays[frame_active_word(frame, id)], ~(1u << (id & 31u)));
         }
         if (status == RAY_HIT) {
@@ -110,5 +124,6 @@ fn main(
     workgroupBarrier();
     if (lane == 0u) {
         atomicAdd(&rays[RAYS_HITS], atomicLoad(&hit_count));
+        atomicMax(&rays[RAYS_OPEN_NOW], atomicLoad(&open_depth));
     }
 }

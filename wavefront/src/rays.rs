@@ -55,12 +55,22 @@ pub struct Counters {
     /// Lists of active rays made so far: one by every round that had any, and those of
     /// [`crate::Rounds::lists_at_start`].
     pub lists: u32,
-    pad: [u32; 3],
+    /// Scratch of the round that is going on.
+    open_now: u32,
+    /// Bits of [`Counters::open_depth_voxels`].
+    open: u32,
+    pad: u32,
 }
 
 impl Counters {
     /// Where the counters are in [`RayBuffers::rays`]: byte offset and length.
     pub const BYTES: (u64, u64) = (0, size_of::<Counters>() as u64);
+
+    /// The longest part of an active ray, in voxels, in which its first hit may still lie: from where
+    /// it waits to where it leaves the volume. 0 when no ray is active.
+    pub fn open_depth_voxels(&self) -> f32 {
+        f32::from_bits(self.open)
+    }
 }
 
 /// The kernels that all strategies share. Immutable; used with any number of pictures.

@@ -95,6 +95,8 @@ const RAYS_ENTERED: u32 = 1u;  // rays that enter the volume
 const RAYS_HITS: u32 = 2u;     // hits shaded so far
 const RAYS_LISTED: u32 = 3u;   // length of the active list
 const RAYS_LISTS: u32 = 4u;    // lists made so far in the frame; none is made when no ray is active
+const RAYS_OPEN_NOW: u32 = 5u; // RAYS_OPEN of the round that is going on
+const RAYS_OPEN: u32 = 6u;     // f32 bits: most voxels in which an active ray's first hit may still lie
 const RAYS_HEADER: u32 = 8u;
 
 // The word that holds the active bit of a ray, which is its number's lowest five bits.
