@@ -2,32 +2,20 @@
 
 #![allow(clippy::unwrap_used, reason = "a failing test says where")]
 
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+mod cli;
 
-/// The example's program, which `cargo test` builds beside the tests.
-fn program() -> PathBuf {
-    let test = std::env::current_exe().unwrap();
-    let folder = test.parent().and_then(Path::parent).unwrap();
-    let program = folder.join("examples").join(format!("render{}", std::env::consts::EXE_SUFFIX));
-    assert!(program.is_file(), "{program:?} is missing: run `cargo build --examples` first");
-    program
-}
+use std::path::PathBuf;
+use std::process::Output;
+
+use cli::{path, read_json, text};
 
 fn render(arguments: &[&str]) -> Output {
-    Command::new(program()).args(arguments).output().unwrap()
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
+    cli::run("render", arguments)
 }
 
 /// Runs to success and returns what is printed.
 fn succeed(arguments: &[&str]) -> String {
-    let output = render(arguments);
-    let (out, err) = (text(&output.stdout), text(&output.stderr));
-    assert_eq!(output.status.code(), Some(0), "{arguments:?}\n{out}\n{err}");
-    out
+    cli::succeed("render", arguments)
 }
 
 /// Fails with exit code 2 and a message that contains all of `expected`.
@@ -40,18 +28,8 @@ fn refuse(arguments: &[&str], expected: &[&str]) {
     }
 }
 
-/// A folder of its own for every test.
 fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("render_cli").join(name);
-    if folder.exists() {
-        std::fs::remove_dir_all(&folder).unwrap();
-    }
-    std::fs::create_dir_all(&folder).unwrap();
-    folder
-}
-
-fn path(folder: &Path, name: &str) -> String {
-    folder.join(name).to_str().unwrap().to_owned()
+    cli::folder("render_cli", name)
 }
 
 /// Size and samples of the only channel, "Z".
@@ -61,10 +39,6 @@ fn read_exr(path: &str) -> ([usize; 2], Vec<f32>) {
     let [channel] = &layer.channel_data.list[..] else { panic!("not one channel") };
     assert_eq!(channel.name.to_string(), "Z");
     ([layer.size.0, layer.size.1], channel.sample_data.values_as_f32().collect())
-}
-
-fn read_json(path: &str) -> serde_json::Value {
-    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
 /// A NIfTI-1 file of 12x10x8 floats that hold their z index, 2x2x2 units apart.

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use crate::frame::FrameRow;
-use crate::plot::{Axis, Bars, Lines, Scale, Series};
 use crate::rows::Row;
+use crate::support::plot::{Axis, Bars, Lines, Scale, Series};
 use crate::support::{Failure, write_file};
 
 /// Writes `cold.svg`, `warm.svg` and, for every volume and size, `progress-*.svg`; of the set

@@ -8,7 +8,8 @@ use serde::Serialize;
 use crate::library::Wanted;
 use crate::needed::Needed;
 use crate::scene::View;
-use crate::sets::{Setting, Subject};
+use crate::sets::Setting;
+use crate::support::subject::Subject;
 
 /// What frames have in common whose median is taken.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -18,7 +18,6 @@ mod library;
 mod measure;
 mod needed;
 mod output;
-mod plot;
 mod rows;
 mod scaling;
 mod scene;
@@ -33,8 +32,8 @@ use std::path::PathBuf;
 
 use clap::Parser;
 use measure::Results;
-use output::Origin;
 use scene::Scene;
+use support::origin::Origin;
 use support::{Failure, Gpu};
 
 /// Measures both strategies on fixed views.

@@ -7,10 +7,8 @@ use serde::Serialize;
 use crate::measure::{Measured, Results, Skipped, options};
 use crate::rows::median;
 use crate::scene::{Scene, View};
-use crate::sets::{
-    FIVE_POSITIONS, SMALL, Setting, Subject, block_sorted, cube, default_look_ahead, run_ahead,
-    turbulence,
-};
+use crate::sets::{FIVE_POSITIONS, SMALL, Setting, block_sorted, default_look_ahead, run_ahead};
+use crate::support::subject::{Subject, cube, turbulence};
 use crate::support::{Failure, Gpu};
 
 /// Slots of every cache, where the volume has as many blocks.

@@ -10,8 +10,8 @@ use crate::cpu_volume::{CpuVolume, Masks};
 use crate::cpu_walk::Surface;
 use crate::library::frame_options;
 use crate::needed::{Needed, needed};
-use crate::sets::Subject;
 use crate::support::Failure;
+use crate::support::subject::{Subject, stream};
 
 /// Volumes with more voxels are not decoded on the CPU: 4 bytes each.
 const MOST_DECODED_VOXELS: u64 = 1 << 27;
@@ -38,16 +38,6 @@ pub struct View {
     /// Azimuth and elevation in degrees.
     pub position: [f64; 2],
     pub size: [u32; 2],
-}
-
-/// A volume's stream and its suggested isovalue.
-pub fn stream(subject: &Subject) -> Result<(ZfpVolume, f32), Failure> {
-    if subject.volume == "brain" {
-        return Ok((volumes::brain(), volumes::BRAIN_ISOVALUE));
-    }
-    let field = volumes::by_name(subject.volume, subject.dims)?;
-    let volume = volumes::generate(&*field, subject.dims, subject.rate)?;
-    Ok((volume, field.suggested_isovalue() as f32))
 }
 
 impl Scene {

@@ -4,6 +4,7 @@ use clap::ValueEnum;
 use progressive_iso::{BlockSortedOptions, FrameOptions, TraversalStrategy};
 
 use crate::library::Wanted;
+use crate::support::subject::{BRAIN, Subject, cube, turbulence};
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -18,29 +19,6 @@ pub enum Set {
     Scaling,
     /// From the compressed stream in memory to a picture, for a comparison with VTK.
     Vtk,
-}
-
-/// A volume, named.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Subject {
-    /// "brain", or the name of a generator.
-    pub volume: &'static str,
-    /// Voxels per axis of a generated volume.
-    pub dims: [u32; 3],
-    /// Bits per voxel of a generated volume.
-    pub rate: f64,
-}
-
-impl Subject {
-    /// Name with the volume's size, as in the reports.
-    pub fn name(&self) -> String {
-        let [x, y, z] = self.dims;
-        match self.volume {
-            "brain" => "brain".into(),
-            name if x == y && y == z => format!("{name}-{x}"),
-            name => format!("{name}-{x}x{y}x{z}"),
-        }
-    }
 }
 
 /// One volume in one picture size.
@@ -149,17 +127,6 @@ pub const FIVE_POSITIONS: &[[f64; 2]] =
 pub const SMALL: [u32; 2] = [640, 368];
 pub const MIDDLE: [u32; 2] = [1280, 720];
 const LARGE: [u32; 2] = [1920, 1088];
-
-pub fn cube(volume: &'static str, edge: u32, rate: f64) -> Subject {
-    Subject { volume, dims: [edge; 3], rate }
-}
-
-/// The bundled scan.
-pub const BRAIN: Subject = Subject { volume: "brain", dims: [193, 229, 193], rate: 4.0 };
-
-pub fn turbulence(edge: u32) -> Subject {
-    cube("turbulence", edge, 4.0)
-}
 
 /// The cases of a set. Those of one volume follow each other, so that it is made once.
 pub fn cases(set: Set) -> Vec<Case> {

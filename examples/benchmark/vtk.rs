@@ -12,9 +12,10 @@ use volume_io::ReadOptions;
 
 use crate::cpu_volume::CpuVolume;
 use crate::library::{self, Wanted, with_residency};
-use crate::output::{Origin, write_json};
-use crate::scene::{FIELD_OF_VIEW_DEGREES, Scene, View, stream};
-use crate::sets::{MIDDLE, Subject, cube, default_look_ahead, turbulence};
+use crate::scene::{FIELD_OF_VIEW_DEGREES, Scene, View};
+use crate::sets::{MIDDLE, default_look_ahead};
+use crate::support::origin::{Origin, write_json};
+use crate::support::subject::{Subject, cube, stream, turbulence};
 use crate::support::{Failure, Gpu, reset_resident_peak, resident_bytes, write_file};
 
 /// Repetitions, each with a new renderer.

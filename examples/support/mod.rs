@@ -2,6 +2,11 @@
 
 #![allow(dead_code, unreachable_pub, reason = "every example uses a part of this")]
 
+pub mod origin;
+pub mod plot;
+pub mod subject;
+pub mod table;
+
 use std::path::Path;
 
 use progressive_iso::{Capture, PassReport, ProgressiveIsoRenderer, wgpu};
