@@ -80,8 +80,9 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
 /// All curves of a volume: rates outside, so that one decoded volume exists at a time.
 fn measure_case(bench: &mut Bench, case: &Case, curves: &mut Vec<Curve>) -> Result<(), Failure> {
     let volume = Volume::new(&case.subject)?;
+    let pictures = case.pictures.iter();
     let scenes: Vec<_> =
-        case.scenes().map(|(view, size)| volume.scene(view, size)).collect::<Result<_, _>>()?;
+        pictures.map(|&(view, size)| volume.scene(view, size)).collect::<Result<_, _>>()?;
     let truths: Vec<_> =
         scenes.iter().map(|scene| scene.reference(&volume, &volume.samples)).collect();
     for &rate in case.rates {

@@ -11,12 +11,15 @@ use progressive_iso::{
 use volume_io::ZfpVolume;
 
 use crate::curve::{Curve, Point};
-use crate::sets::{Case, Memory, Setting};
+use crate::sets::{Case, LEAST_SLOTS, Memory, Setting};
 use crate::support::{Failure, Gpu, matching_adapters};
 use crate::volume::{Scene, Volume};
 
 /// More than any cache and any volume here needs.
 const AMPLE_BYTES: u64 = 2 << 30;
+
+/// Steps in which the smallest budget is looked for: 60 slots.
+const BUDGET_STEP_BYTES: u64 = 16 << 10;
 
 /// Every pass up to this one has its picture looked at; of later ones, every one that is a tenth later
 /// than the last one looked at.
@@ -168,19 +171,35 @@ fn options(
     };
     let options = RendererOptions {
         size,
-        budget_bytes: if setting.memory == Memory::Smallest { 0 } else { AMPLE_BYTES },
+        budget_bytes: AMPLE_BYTES,
         outputs: Outputs { depth: true, normal: true, status: true },
         capture: true,
         strategy: setting.strategy,
         residency,
         ..Default::default()
     };
-    match ScenePlan::new(volume, &options, limits) {
-        Err(Error::BudgetTooSmall { minimum, .. }) => {
-            Ok(RendererOptions { budget_bytes: minimum, ..options })
+    match setting.memory {
+        Memory::Smallest => smallest(volume, options, limits),
+        _ => Ok(options),
+    }
+}
+
+/// The options with the smallest budget.
+fn smallest(
+    volume: &CompressedVolume,
+    options: RendererOptions,
+    limits: &wgpu::Limits,
+) -> Result<RendererOptions, Failure> {
+    let mut smallest = RendererOptions { budget_bytes: 0, ..options };
+    loop {
+        match ScenePlan::new(volume, &smallest, limits) {
+            Err(Error::BudgetTooSmall { minimum, .. }) => smallest.budget_bytes = minimum,
+            Err(error) => return Err(error.into()),
+            Ok(plan) if plan.slots() < LEAST_SLOTS.min(volume.layout().block_count()) => {
+                smallest.budget_bytes += BUDGET_STEP_BYTES;
+            }
+            Ok(_) => return Ok(smallest),
         }
-        Err(error) => Err(error.into()),
-        Ok(_) => Ok(options),
     }
 }
 

@@ -9,9 +9,9 @@ use crate::support::subject::{BRAIN, Subject, cube, turbulence};
 /// How much is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Set {
-    /// One view in one size of every volume: a minute or two each on two cores with a software adapter.
+    /// One view in one size of every volume: a minute each on two cores with a software adapter.
     Brief,
-    /// Two views and two sizes of every volume.
+    /// Two views and a larger picture, too.
     Ci,
     /// Volumes so small that the measurement can be tested.
     Test,
@@ -25,9 +25,12 @@ pub enum Memory {
     Full,
     /// Blocks are decoded when rays need them, into a cache that holds them all.
     Cached,
-    /// The least budget that the library accepts.
+    /// The least budget that the library accepts and that leaves a cache of [`LEAST_SLOTS`].
     Smallest,
 }
+
+/// With fewer slots, frames end, too, but take a pass for as few rays as the cache serves.
+pub const LEAST_SLOTS: u64 = 2048;
 
 /// One way of rendering.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,10 +74,8 @@ const RATES: &[f64] = &[1.0, 2.0, 4.0, 8.0, 16.0];
 pub struct Case {
     /// Its rate does not count.
     pub subject: Subject,
-    /// Azimuth and elevation in degrees.
-    pub views: &'static [[f64; 2]],
-    /// Pixels.
-    pub sizes: &'static [[u32; 2]],
+    /// Azimuth and elevation in degrees, and pixels.
+    pub pictures: &'static [([f64; 2], [u32; 2])],
     /// Bits per voxel.
     pub rates: &'static [f64],
     pub settings: &'static [Setting],
@@ -82,21 +83,13 @@ pub struct Case {
     pub runs: usize,
 }
 
-impl Case {
-    /// Views in all sizes.
-    pub fn scenes(&self) -> impl Iterator<Item = ([f64; 2], [u32; 2])> {
-        let (views, sizes) = (self.views, self.sizes);
-        views.iter().flat_map(move |&view| sizes.iter().map(move |&size| (view, size)))
-    }
-}
-
 /// The cases of a set.
 pub fn cases(set: Set) -> Vec<Case> {
-    const ONE_VIEW: &[[f64; 2]] = &[[20.0, 15.0]];
+    const FRONT: [f64; 2] = [20.0, 15.0];
+    const SMALL: [u32; 2] = [320, 184];
     let brief = |subject| Case {
         subject,
-        views: ONE_VIEW,
-        sizes: &[[320, 184]],
+        pictures: &[(FRONT, SMALL)],
         rates: RATES,
         settings: SETTINGS,
         runs: 3,
@@ -105,13 +98,17 @@ pub fn cases(set: Set) -> Vec<Case> {
     match set {
         Set::Brief => volumes.map(brief).to_vec(),
         Set::Ci => {
-            let views = &[[20.0, 15.0], [200.0, -25.0]];
-            let sizes = &[[320, 184], [640, 368]];
-            volumes.map(|subject| Case { views, sizes, ..brief(subject) }).to_vec()
+            let pictures = &[(FRONT, SMALL), ([200.0, -25.0], SMALL), (FRONT, [640, 368])];
+            volumes.map(|subject| Case { pictures, ..brief(subject) }).to_vec()
         }
         Set::Test => {
             let subject = Subject { volume: "gyroid", dims: [30, 26, 28], rate: 4.0 };
-            vec![Case { sizes: &[[48, 32]], rates: &[2.0, 8.0], runs: 1, ..brief(subject) }]
+            vec![Case {
+                pictures: &[(FRONT, [48, 32])],
+                rates: &[2.0, 8.0],
+                runs: 1,
+                ..brief(subject)
+            }]
         }
     }
 }
