@@ -80,9 +80,8 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
 /// All curves of a volume: rates outside, so that one decoded volume exists at a time.
 fn measure_case(bench: &mut Bench, case: &Case, curves: &mut Vec<Curve>) -> Result<(), Failure> {
     let volume = Volume::new(&case.subject)?;
-    let pictures = case.pictures.iter();
     let scenes: Vec<_> =
-        pictures.map(|&(view, size)| volume.scene(view, size)).collect::<Result<_, _>>()?;
+        case.views.iter().map(|view| volume.scene(view)).collect::<Result<_, _>>()?;
     let truths: Vec<_> =
         scenes.iter().map(|scene| scene.reference(&volume, &volume.samples)).collect();
     for &rate in case.rates {
@@ -90,7 +89,7 @@ fn measure_case(bench: &mut Bench, case: &Case, curves: &mut Vec<Curve>) -> Resu
         let decoded = stream.decode();
         for (scene, truth) in scenes.iter().zip(&truths) {
             let reference = scene.reference(&volume, &decoded);
-            for setting in case.settings {
+            for setting in scene.settings {
                 let curve =
                     bench.curve(case, &volume, scene, &stream, *setting, [truth, &reference])?;
                 println!("  {}", curve.line());

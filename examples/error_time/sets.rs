@@ -58,8 +58,9 @@ impl Memory {
 const BLOCK_SORTED: TraversalStrategy =
     TraversalStrategy::BlockSorted(BlockSortedOptions { start_factor: 1, speculation: true });
 
-/// The published strategy needs a cache.
-const SETTINGS: &[Setting] = &[
+/// The published strategy needs a cache. The last one is for small pictures: all rays of a larger one ask
+/// for more blocks at a time than such a cache holds, and few get theirs.
+const SETTINGS: &[Setting; 5] = &[
     Setting { strategy: TraversalStrategy::RunAhead, memory: Memory::Full },
     Setting { strategy: TraversalStrategy::RunAhead, memory: Memory::Cached },
     Setting { strategy: TraversalStrategy::RunAhead, memory: Memory::Smallest },
@@ -69,46 +70,46 @@ const SETTINGS: &[Setting] = &[
 
 const RATES: &[f64] = &[1.0, 2.0, 4.0, 8.0, 16.0];
 
+/// What is looked at, and how it is rendered.
+#[derive(Clone, Copy, Debug)]
+pub struct View {
+    /// Azimuth and elevation in degrees.
+    pub position: [f64; 2],
+    /// Pixels.
+    pub size: [u32; 2],
+    pub settings: &'static [Setting],
+}
+
 /// One volume.
 #[derive(Clone, Copy, Debug)]
 pub struct Case {
     /// Its rate does not count.
     pub subject: Subject,
-    /// Azimuth and elevation in degrees, and pixels.
-    pub pictures: &'static [([f64; 2], [u32; 2])],
+    pub views: &'static [View],
     /// Bits per voxel.
     pub rates: &'static [f64],
-    pub settings: &'static [Setting],
     /// Timed runs of every setting, an odd number: the one of median length counts.
     pub runs: usize,
 }
 
 /// The cases of a set.
 pub fn cases(set: Set) -> Vec<Case> {
-    const FRONT: [f64; 2] = [20.0, 15.0];
-    const SMALL: [u32; 2] = [320, 184];
-    let brief = |subject| Case {
-        subject,
-        pictures: &[(FRONT, SMALL)],
-        rates: RATES,
-        settings: SETTINGS,
-        runs: 3,
-    };
+    const SMALL: View = View { position: [20.0, 15.0], size: [320, 184], settings: SETTINGS };
+    const BEHIND: View = View { position: [200.0, -25.0], ..SMALL };
+    const LARGE: View =
+        View { size: [640, 368], settings: SETTINGS.split_at(SETTINGS.len() - 1).0, ..SMALL };
+    const TINY: View = View { size: [48, 32], ..SMALL };
+    let brief = |subject| Case { subject, views: &[SMALL], rates: RATES, runs: 3 };
     let volumes = [BRAIN, turbulence(128), cube("shells", 128, 4.0)];
     match set {
         Set::Brief => volumes.map(brief).to_vec(),
         Set::Ci => {
-            let pictures = &[(FRONT, SMALL), ([200.0, -25.0], SMALL), (FRONT, [640, 368])];
-            volumes.map(|subject| Case { pictures, ..brief(subject) }).to_vec()
+            let views = &[SMALL, BEHIND, LARGE];
+            volumes.map(|subject| Case { views, ..brief(subject) }).to_vec()
         }
         Set::Test => {
             let subject = Subject { volume: "gyroid", dims: [30, 26, 28], rate: 4.0 };
-            vec![Case {
-                pictures: &[(FRONT, [48, 32])],
-                rates: &[2.0, 8.0],
-                runs: 1,
-                ..brief(subject)
-            }]
+            vec![Case { views: &[TINY], rates: &[2.0, 8.0], runs: 1, ..brief(subject) }]
         }
     }
 }

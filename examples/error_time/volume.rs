@@ -3,6 +3,7 @@
 use progressive_iso::{Camera, CompressedVolume, Frame, FrameOptions, FrameView};
 use volume_io::ZfpVolume;
 
+use crate::sets::{Setting, View};
 use crate::support::Failure;
 use crate::support::subject::{Subject, stream};
 
@@ -23,6 +24,7 @@ pub struct Volume {
 pub struct Scene {
     pub position: [f64; 2],
     pub size: [u32; 2],
+    pub settings: &'static [Setting],
     pub frame: Frame,
     pub view: FrameView,
 }
@@ -57,7 +59,8 @@ impl Volume {
 
     /// The volume fills the picture, its corners do not fit. A pass is one round, so that there are
     /// as many pictures as can be.
-    pub fn scene(&self, position: [f64; 2], size: [u32; 2]) -> Result<Scene, Failure> {
+    pub fn scene(&self, view: &View) -> Result<Scene, Failure> {
+        let View { position, size, settings } = *view;
         let (center, radius) = self.placed.bounding_ball();
         let [azimuth, elevation] = position;
         let aspect = f64::from(size[0]) / f64::from(size[1]);
@@ -67,6 +70,6 @@ impl Volume {
         let options =
             FrameOptions { rounds_per_pass: 1, pass_ms: f32::INFINITY, ..Default::default() };
         let frame = Frame { camera, isovalues: vec![self.isovalue], options };
-        Ok(Scene { position, size, frame, view })
+        Ok(Scene { position, size, settings, frame, view })
     }
 }
