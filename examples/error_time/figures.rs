@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use gpu_testkit::statistics::quantile;
+use gpu_testkit::statistics::{pareto_front, quantile};
 
 use crate::best::scenes;
 use crate::curve::{Curve, Point};
@@ -15,19 +15,19 @@ use crate::tables::pictures;
 struct Quantity {
     name: &'static str,
     label: &'static str,
-    value: fn(&Point) -> Option<f64>,
+    value: fn(&Point) -> f64,
 }
 
 const QUANTITIES: &[Quantity] = &[
     Quantity {
         name: "color",
         label: "colour: root mean square error in 255ths",
-        value: |p| Some(p.errors.color_rms),
+        value: |p| p.errors.color_rms,
     },
     Quantity {
         name: "mask",
-        label: "share of rays with the wrong answer",
-        value: |p| Some(p.errors.mask_disagreement),
+        label: "share of rays with the wrong answer (none: half a ray)",
+        value: |p| p.errors.mask_disagreement,
     },
 ];
 
@@ -68,28 +68,21 @@ fn middle_rate(curves: &[&Curve]) -> f64 {
 
 /// Curves, and the front of all settings.
 fn lines(title: String, quantity: &Quantity, some: &[&Curve], all: &[&Curve]) -> Lines {
-    // A logarithmic axis has no 0.
-    let place = |p: &Point| (quantity.value)(p).filter(|v| *v > 0.0).map(|v| [p.ms, v]);
-    let mut series: Vec<Series> = some
-        .iter()
-        .map(|curve| Series {
-            label: curve.label(),
-            points: curve.points.iter().filter_map(place).collect(),
-            steps: false,
-        })
-        .collect();
-    let mut front: Vec<&Point> =
-        all.iter().flat_map(|c| &c.points).filter(|point| point.on_front).collect();
-    front.sort_by(|a, b| a.ms.total_cmp(&b.ms));
-    series.push(Series {
-        label: "best of all settings (PSNR)".into(),
-        points: front.into_iter().filter_map(place).collect(),
-        steps: false,
-    });
+    let places = |curve: &Curve| -> Vec<[f64; 2]> {
+        // A logarithmic axis has no 0.
+        let least = 0.5 / curve.size.map(f64::from).iter().product::<f64>();
+        curve.points.iter().map(|p| [p.ms, (quantity.value)(p).max(least)]).collect()
+    };
+    let line = |label: String, points| Series { label, points, steps: false };
+    let mut series: Vec<Series> =
+        some.iter().map(|curve| line(curve.label(), places(curve))).collect();
+    let points: Vec<[f64; 2]> = all.iter().flat_map(|curve| places(curve)).collect();
+    let front = pareto_front(&points).into_iter().map(|i| points[i]).collect();
+    series.push(line("best of all settings and rates".into(), front));
     let places = || series.iter().flat_map(|series| &series.points);
     Lines {
         title,
-        x_label: "ms since before the renderer was made".into(),
+        x_label: "ms, set-up counted".into(),
         y_label: quantity.label.into(),
         x: Axis::around(Scale::Log, places().map(|p| p[0])),
         y: Axis::around(Scale::Log, places().map(|p| p[1])),

@@ -77,25 +77,35 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// All curves of a volume: rates outside, so that one decoded volume exists at a time.
+/// All curves of a volume. Pictures are looked at once; then all settings take turns, so that they see
+/// the same machine.
 fn measure_case(bench: &mut Bench, case: &Case, curves: &mut Vec<Curve>) -> Result<(), Failure> {
     let volume = Volume::new(&case.subject)?;
     let scenes: Vec<_> =
         case.views.iter().map(|view| volume.scene(view)).collect::<Result<_, _>>()?;
     let truths: Vec<_> =
         scenes.iter().map(|scene| scene.reference(&volume, &volume.samples)).collect();
+    let mut candidates = Vec::new();
     for &rate in case.rates {
         let stream = volume.compressed(rate)?;
         let decoded = stream.decode();
         for (scene, truth) in scenes.iter().zip(&truths) {
             let reference = scene.reference(&volume, &decoded);
-            for setting in scene.settings {
-                let curve =
-                    bench.curve(case, &volume, scene, &stream, *setting, [truth, &reference])?;
-                println!("  {}", curve.line());
-                curves.push(curve);
+            for &setting in scene.settings {
+                let references = [truth, &reference];
+                candidates.push(bench.candidate(&volume, scene, &stream, setting, references)?);
             }
         }
+    }
+    for _ in 1..case.runs {
+        for candidate in &mut candidates {
+            bench.repeat(candidate)?;
+        }
+    }
+    for candidate in candidates {
+        let curve = candidate.finish();
+        println!("  {}", curve.line());
+        curves.push(curve);
     }
     Ok(())
 }

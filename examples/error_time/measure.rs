@@ -11,7 +11,7 @@ use progressive_iso::{
 use volume_io::ZfpVolume;
 
 use crate::curve::{Curve, Point};
-use crate::sets::{Case, LEAST_SLOTS, Memory, Setting};
+use crate::sets::{LEAST_SLOTS, Memory, Setting};
 use crate::support::{Failure, Gpu, matching_adapters};
 use crate::volume::{Scene, Volume};
 
@@ -32,18 +32,35 @@ pub struct Bench {
     warm: HashSet<String>,
 }
 
-/// A pass of a run.
+/// A curve that is being measured.
+pub struct Candidate<'a> {
+    scene: &'a Scene,
+    volume: CompressedVolume,
+    options: RendererOptions,
+    curve: Curve,
+    /// Times of runs, as many passes in each.
+    times: Vec<Times>,
+}
+
+/// When a run was where.
+#[derive(Clone)]
+struct Times {
+    setup_ms: f64,
+    /// After every pass.
+    pass_ms: Vec<f64>,
+}
+
+/// The picture after a pass.
 struct Seen {
     report: PassReport,
-    ms: f64,
-    /// Where it is looked at.
-    capture: Option<Capture>,
+    capture: Capture,
 }
 
 /// A frame from nothing to the finished picture.
 struct Run {
-    setup_ms: f64,
-    passes: Vec<Seen>,
+    times: Times,
+    /// Of some passes, in order; none where nobody looked.
+    seen: Vec<Seen>,
 }
 
 /// A clock that does not run while pictures are read back.
@@ -79,16 +96,16 @@ impl Bench {
         Ok(Gpu::open(&self.adapters)?.name())
     }
 
-    /// Measures a setting; `references`: the f64 renderer on uncompressed and on decoded samples.
-    pub fn curve(
+    /// Looks at the pictures of a setting; `references`: the f64 renderer on uncompressed and on decoded
+    /// samples.
+    pub fn candidate<'a>(
         &mut self,
-        case: &Case,
         volume: &Volume,
-        scene: &Scene,
+        scene: &'a Scene,
         stream: &ZfpVolume,
         setting: Setting,
         [truth, reference]: [&Picture; 2],
-    ) -> Result<Curve, Failure> {
+    ) -> Result<Candidate<'a>, Failure> {
         let compressed = volume.placed(stream)?;
         let limits = Gpu::open(&self.adapters)?.device.limits();
         let options = options(&compressed, scene.size, setting, &limits)?;
@@ -96,16 +113,11 @@ impl Bench {
         if self.warm.insert(format!("{setting:?} {}", plan.slots().div_ceil(1 << 19))) {
             self.run(&compressed, scene, &options, false)?;
         }
-        let looked_at = self.run(&compressed, scene, &options, true)?;
-        let mut runs = vec![looked_at];
-        for _ in 1..case.runs {
-            runs.push(self.run(&compressed, scene, &options, false)?);
-        }
-        let (setup_ms, times) = median_run(&runs);
-        let points = points(scene, &runs[0], &times, truth)?;
-        let finished = finished(scene, &runs[0])?;
-        Ok(Curve {
-            volume: case.subject.name(),
+        let run = self.run(&compressed, scene, &options, true)?;
+        let last = run.seen.last().ok_or("the frame has no picture")?;
+        let finished = scene.shown(&last.capture)?;
+        let curve = Curve {
+            volume: volume.name.clone(),
             view: scene.position,
             strategy: setting.strategy_name(),
             rate: stream.rate(),
@@ -113,12 +125,23 @@ impl Bench {
             residency: setting.memory,
             budget_bytes: options.budget_bytes,
             slots: plan.slots(),
-            passes: runs[0].passes.len() as u32,
-            setup_ms,
+            passes: last.report.pass,
+            setup_ms: run.times.setup_ms,
             arithmetic: finished.errors(reference),
             compression: reference.errors(truth),
-            points,
-        })
+            points: points(scene, &run, truth, &finished)?,
+        };
+        Ok(Candidate { scene, volume: compressed, options, curve, times: vec![run.times] })
+    }
+
+    /// Takes the times of a candidate once more.
+    pub fn repeat(&self, candidate: &mut Candidate<'_>) -> Result<(), Failure> {
+        let Candidate { scene, volume, options, times, .. } = candidate;
+        let run = self.run(volume, scene, options, false)?;
+        if run.times.pass_ms.len() == times[0].pass_ms.len() {
+            times.push(run.times);
+        }
+        Ok(())
     }
 
     /// Renders the frame with a renderer of its own, on a device of its own.
@@ -132,29 +155,41 @@ impl Bench {
         let Gpu { device, queue, .. } = Gpu::open(&self.adapters)?;
         let mut clock = Clock::start();
         let mut renderer = ProgressiveIsoRenderer::new(&device, &queue, volume.clone(), *options)?;
-        let setup_ms = clock.ms();
+        let mut times = Times { setup_ms: clock.ms(), pass_ms: Vec::new() };
         renderer.set_frame(&scene.frame)?;
-        let (mut passes, mut next, mut failure) = (Vec::new(), 1, None);
+        let (mut seen, mut next, mut failure) = (Vec::new(), 1, None);
         renderer.render_to_completion(&device, &queue, |renderer, report| {
             if report.pass == 0 {
                 return true;
             }
-            let ms = clock.ms();
-            let mut capture = None;
+            times.pass_ms.push(clock.ms());
             if look && (report.pass >= next || report.complete()) {
                 next = report.pass + 1 + report.pass.saturating_sub(EVERY_PASS) / 10;
                 match clock.pause(|| renderer.capture_blocking(&device, &queue)) {
-                    Ok(picture) => capture = Some(picture),
+                    Ok(capture) => seen.push(Seen { report: *report, capture }),
                     Err(error) => failure = Some(error),
                 }
             }
-            passes.push(Seen { report: *report, ms, capture });
             failure.is_none()
         })?;
         match failure {
             Some(error) => Err(error.into()),
-            None => Ok(Run { setup_ms, passes }),
+            None => Ok(Run { times, seen }),
         }
+    }
+}
+
+impl Candidate<'_> {
+    /// The curve with the times of the run of median length.
+    pub fn finish(mut self) -> Curve {
+        let length = |times: &Times| times.pass_ms.last().copied().unwrap_or_default();
+        self.times.sort_by(|a, b| length(a).total_cmp(&length(b)));
+        let times = &self.times[self.times.len() / 2];
+        self.curve.setup_ms = times.setup_ms;
+        for point in &mut self.curve.points {
+            point.ms = times.pass_ms[point.pass as usize - 1];
+        }
+        self.curve
     }
 }
 
@@ -203,38 +238,24 @@ fn smallest(
     }
 }
 
-/// Set-up and times of the passes of the run of median length among those with as many passes as the
-/// first one.
-fn median_run(runs: &[Run]) -> (f64, Vec<f64>) {
-    let mut same: Vec<&Run> =
-        runs.iter().filter(|run| run.passes.len() == runs[0].passes.len()).collect();
-    let length = |run: &Run| run.passes.last().map_or(0.0, |seen| seen.ms);
-    same.sort_by(|a, b| length(a).total_cmp(&length(b)));
-    let run = same[same.len() / 2];
-    (run.setup_ms, run.passes.iter().map(|seen| seen.ms).collect())
-}
-
-fn finished(scene: &Scene, run: &Run) -> Result<Picture, Failure> {
-    let capture = run.passes.last().and_then(|seen| seen.capture.as_ref());
-    scene.shown(capture.ok_or("the frame has no finished picture")?)
-}
-
-/// The passes whose pictures were looked at.
-fn points(scene: &Scene, run: &Run, times: &[f64], truth: &Picture) -> Result<Vec<Point>, Failure> {
-    let finished = finished(scene, run)?;
-    let mut points = Vec::new();
-    for (seen, &ms) in run.passes.iter().zip(times) {
-        let Some(capture) = &seen.capture else { continue };
+/// The pictures that were looked at.
+fn points(
+    scene: &Scene,
+    run: &Run,
+    truth: &Picture,
+    finished: &Picture,
+) -> Result<Vec<Point>, Failure> {
+    let point = |Seen { report, capture }: &Seen| {
         let shown = scene.shown(capture)?;
-        points.push(Point {
-            pass: seen.report.pass,
-            ms,
-            completeness: seen.report.completeness(),
-            open_depth_voxels: seen.report.open_depth_voxels,
+        Ok(Point {
+            pass: report.pass,
+            ms: run.times.pass_ms[report.pass as usize - 1],
+            completeness: report.completeness(),
+            open_depth_voxels: report.open_depth_voxels,
             errors: shown.errors(truth),
-            against_finished: shown.errors(&finished),
+            against_finished: shown.errors(finished),
             on_front: false,
-        });
-    }
-    Ok(points)
+        })
+    };
+    run.seen.iter().map(point).collect()
 }

@@ -88,7 +88,7 @@ pub struct Case {
     pub views: &'static [View],
     /// Bits per voxel.
     pub rates: &'static [f64],
-    /// Timed runs of every setting, an odd number: the one of median length counts.
+    /// Runs of every setting, an odd number: the one of median length counts.
     pub runs: usize,
 }
 

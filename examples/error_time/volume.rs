@@ -12,6 +12,7 @@ const FIELD_OF_VIEW_DEGREES: f64 = 50.0;
 
 /// Samples as they are before the compression that is measured.
 pub struct Volume {
+    pub name: String,
     pub dims: [u32; 3],
     /// x fastest.
     pub samples: Vec<f32>,
@@ -38,7 +39,7 @@ impl Volume {
             name => volumes::samples(&*volumes::by_name(name, subject.dims)?, subject.dims),
         };
         let placed = CompressedVolume::try_from(&zfp)?;
-        Ok(Self { dims: zfp.dims, samples, isovalue, placed })
+        Ok(Self { name: subject.name(), dims: zfp.dims, samples, isovalue, placed })
     }
 
     /// The samples compressed at `rate` bits per voxel.
