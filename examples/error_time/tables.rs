@@ -4,6 +4,7 @@ use gpu_testkit::picture::PictureErrors;
 
 use crate::best::{GOALS, first_to_reach};
 use crate::curve::Curve;
+use crate::sets::Memory;
 use crate::support::origin::Origin;
 use crate::support::table::Table;
 
@@ -11,8 +12,9 @@ pub fn all(origin: &Origin, curves: &[Curve]) -> String {
     let Origin { adapter, commit, date, command } = origin;
     format!(
         "`error_time {command}`, {adapter}, commit {commit}, {date}. Errors against the f64 renderer on \
-         the uncompressed samples unless another reference is named.\n\n{}{}{}",
-        best(curves),
+         the uncompressed samples unless another reference is named.\n\n{}{}{}{}",
+        best("The fastest setting for an error", curves, |_| true),
+        best("The same with the smallest budget", curves, |c| c.residency == Memory::Smallest),
         sources(curves),
         progress(curves)
     )
@@ -35,18 +37,20 @@ fn of_picture<'a>(curves: &'a [Curve], (volume, size): (&str, [u32; 2])) -> Vec<
     curves.iter().filter(|curve| curve.volume == volume && curve.size == size).collect()
 }
 
-/// "For an error below X use Y".
-fn best(curves: &[Curve]) -> String {
+/// "For an error below X use Y", of some settings.
+fn best(title: &str, curves: &[Curve], some: fn(&Curve) -> bool) -> String {
     let pictures = pictures(curves);
     let heads: Vec<String> =
         pictures.iter().map(|(volume, [w, h])| format!("{volume}, {w}x{h}")).collect();
     let heads: Vec<&str> =
         std::iter::once("for an error within").chain(heads.iter().map(String::as_str)).collect();
-    let mut table = Table::new("The fastest setting for an error", &heads, heads.len());
+    let mut table = Table::new(title, &heads, heads.len());
     for goal in GOALS {
         let mut line = vec![goal.name.to_owned()];
         for &picture in &pictures {
-            let best = first_to_reach(&of_picture(curves, picture), goal);
+            let mut curves = of_picture(curves, picture);
+            curves.retain(|curve| some(curve));
+            let best = first_to_reach(&curves, goal);
             let cell = best.map(|(label, ms)| format!("{label}: {ms:.0} ms"));
             line.push(cell.unwrap_or_else(|| "not reached".into()));
         }
@@ -75,7 +79,7 @@ fn sources(curves: &[Curve]) -> String {
     let mut table = Table::new("Compression and arithmetic, finished pictures", &heads, 3);
     for curve in curves {
         // All settings show the same finished picture, bit for bit.
-        if curve.residency.name() != "full" {
+        if curve.residency != Memory::Full {
             continue;
         }
         for (source, errors) in
