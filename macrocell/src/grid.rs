@@ -87,6 +87,12 @@ impl Grid {
         self.coarse_count() >= THIRD_LEVEL_FROM
     }
 
+    /// Masks of all levels.
+    pub fn mask_count(&self) -> u64 {
+        let third = if self.has_third_level() { self.third_count() } else { 0 };
+        self.coarse_count() + third
+    }
+
     /// Bits of a block's x, of its x and y, and of its whole position when the three coordinates are packed
     /// into one number.
     pub fn packing(&self) -> [u32; 3] {

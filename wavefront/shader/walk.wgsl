@@ -77,5 +77,5 @@ fn main(
     let id = rays[frame_list_word(frame, index)];
     let ray = frame_ray(frame, frame_pixel(frame, id)).ray;
     let state = rays[RAYS_HEADER + id];
-    rays[RAYS_HEADER + id] = walk(frame_grid(frame, id), ray, state);
+    rays[RAYS_HEADER + id] = walk(macrocell_active(frame.grid), ray, state);
 }

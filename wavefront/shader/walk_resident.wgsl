@@ -59,5 +59,5 @@ fn main(
     let id = rays[frame_list_word(frame, index)];
     let ray = frame_ray(frame, frame_pixel(frame, id)).ray;
     let block = frame_unpack(frame, rays[RAYS_HEADER + id]);
-    rays[RAYS_HEADER + id] = walk(frame_grid(frame, id), ray, block);
+    rays[RAYS_HEADER + id] = walk(macrocell_active(frame.grid), ray, block);
 }

@@ -18,8 +18,10 @@ pub struct GridParams {
     pub(crate) coarse: [u32; 3],
     pub(crate) has_third_level: u32,
     pub(crate) third: [u32; 3],
-    pub(crate) pad0: u32,
+    pub(crate) active_box: u32,
     pub(crate) last_cell: [i32; 3],
+    pub(crate) pad0: u32,
+    pub(crate) first_block: [i32; 3],
     pub(crate) pad1: u32,
 }
 
@@ -32,8 +34,10 @@ impl GridParams {
             coarse: grid.coarse(),
             has_third_level: grid.has_third_level().into(),
             third: grid.third(),
-            pad0: 0,
+            active_box: grid.mask_count() as u32,
             last_cell: grid.last_cell(),
+            pad0: 0,
+            first_block: [0; 3],
             pad1: 0,
         }
     }

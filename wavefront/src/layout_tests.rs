@@ -59,8 +59,10 @@ fn frame_uniforms_have_the_declared_layout() {
         coarse,
         has_third_level,
         third,
-        pad0,
+        active_box,
         last_cell,
+        pad0,
+        first_block,
         pad1,
     });
     check_struct(&source, "MacrocellGrid", &grid).unwrap();

@@ -122,7 +122,7 @@ impl Rays {
     /// Texts and bindings of the kernels.
     pub fn sources(outputs: Outputs, samples: SampleLayout) -> [KernelSource; 4] {
         let shading = Binding::Uniform { bytes: size_of::<ShadingParams>() as u64 };
-        let start = vec![FRAME_PARAMS, shading, RAYS];
+        let start = vec![FRAME_PARAMS, shading, RAYS, MASKS];
         let mut resolve = vec![FRAME_PARAMS, shading, RAYS];
         resolve.extend(samples.bindings());
         let list = vec![FRAME_PARAMS, RAYS, WRITE, WRITE];
@@ -191,12 +191,14 @@ pub struct RayBuffers {
 }
 
 impl RayBuffers {
-    /// Allocates the state of one picture. `textures` have the plan's outputs and size.
+    /// Allocates the state of one picture. `masks` are the active masks, as `macrocell` makes them;
+    /// `textures` have the plan's outputs and size.
     pub fn new(
         device: &wgpu::Device,
         ledger: &Ledger,
         stage: &Rays,
         plan: &WavefrontPlan,
+        masks: &wgpu::Buffer,
         samples: Samples<'_>,
         textures: &OutputTextures,
     ) -> Self {
@@ -220,7 +222,7 @@ impl RayBuffers {
         let fill_args = args("wavefront.list.fill_args", FILL_ARGS_BYTES);
         let args = args("wavefront.args", ARGS_BYTES);
         let views = || textures.views().iter().map(wgpu::BindingResource::TextureView);
-        let mut start = resources(&[&frame, &shading, &rays]);
+        let mut start = resources(&[&frame, &shading, &rays, masks]);
         start.extend(views());
         let mut resolve = resources(&[&frame, &shading, &rays]);
         resolve.extend(samples.resources());

@@ -26,6 +26,47 @@ fn bit(mask: u64, position: [i32; 3]) -> bool {
 }
 
 impl Masks {
+    /// First block and last dual cell, on each axis, of the box of all active blocks, to the granularity of
+    /// the coarsest level's children; twin of `shader/active_box.wgsl`.
+    pub fn active_box(&self, grid: &Grid) -> [[i32; 3]; 2] {
+        let (first, size, edge) = if grid.has_third_level() {
+            (grid.coarse_count(), grid.third(), 4)
+        } else {
+            (0, grid.coarse(), 1)
+        };
+        let (mut low, mut high) = ([1 << 24; 3], [0; 3]);
+        for (index, &mask) in self.words[first as usize..].iter().enumerate() {
+            let cell = [
+                index as u32 % size[0],
+                index as u32 / size[0] % size[1],
+                index as u32 / (size[0] * size[1]),
+            ];
+            for child in (0..64u32).filter(|child| (mask >> child) & 1 != 0) {
+                for axis in 0..3 {
+                    let place = (4 * cell[axis] + ((child >> (2 * axis)) & 3)) as i32;
+                    low[axis] = low[axis].min(place);
+                    high[axis] = high[axis].max(place + 1);
+                }
+            }
+        }
+        let last = grid.last_cell();
+        [low.map(|b| b * edge), std::array::from_fn(|a| (4 * edge * high[a] - 1).min(last[a]))]
+    }
+
+    /// What the GPU's buffer holds: the masks and the active box.
+    pub fn buffer(&self, grid: &Grid) -> Vec<u64> {
+        let [first, last] = self.active_box(grid).map(|v| v.map(|v| u64::from(v as u32)));
+        let third = u64::from(grid.has_third_level());
+        let mut words = self.words.clone();
+        words.extend([
+            first[0] | first[1] << 32,
+            first[2] | third << 32,
+            last[0] | last[1] << 32,
+            last[2],
+        ]);
+        words
+    }
+
     /// Whether the block is active.
     pub fn block_active(&self, grid: &Grid, block: [u32; 3]) -> bool {
         let coarse = block.map(|b| b / 4);

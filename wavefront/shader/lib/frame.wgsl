@@ -49,14 +49,6 @@ fn frame_zero(loaded: u32) -> u32 {
     return loaded >> 31u;
 }
 
-// The grids, for loops over them.
-fn frame_grid(frame: FrameParams, loaded: u32) -> MacrocellGrid {
-    var grid = frame.grid;
-    grid.last_cell += vec3<i32>(i32(frame_zero(loaded)));
-    grid.has_third_level += frame_zero(loaded);
-    return grid;
-}
-
 // Status of a ray in the two upper bits of its state; the lower ones hold its block, those between them
 // a count.
 const RAY_ACTIVE: u32 = 0u;          // waits for its block, or has not started

@@ -191,11 +191,15 @@ impl Stage {
         let size = [WIDTH, shot.height];
         let wavefront = WavefrontPlan::new(size, OUTPUTS, &device.limits()).unwrap();
         let textures = OutputTextures::new(device, &ledger, OUTPUTS, size);
-        let words: Vec<u32> =
-            masks.words.iter().flat_map(|&w| [w as u32, (w >> 32) as u32]).collect();
+        let words: Vec<u32> = masks
+            .buffer(&shot.field.grid())
+            .iter()
+            .flat_map(|&w| [w as u32, (w >> 32) as u32])
+            .collect();
         let masks = self.buffer(&words);
         let samples = Samples::Cached(&cache);
-        let rays = RayBuffers::new(device, &ledger, &self.rays, &wavefront, samples, &textures);
+        let rays =
+            RayBuffers::new(device, &ledger, &self.rays, &wavefront, &masks, samples, &textures);
         let scene = Scene { rays: &rays, masks: &masks, samples };
         let rounds = self.run_ahead.bind(device, &ledger, scene).unwrap();
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
