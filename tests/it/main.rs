@@ -5,7 +5,6 @@
 #![allow(clippy::unwrap_used, reason = "a failed set-up fails the test")]
 #![allow(clippy::print_stdout, reason = "measured numbers, shown with --nocapture")]
 
-mod bounds;
 mod budget;
 mod compare;
 mod draw;
