@@ -183,7 +183,9 @@ pub fn root_and_steps(b: [f32; 4], bracket: Bracket, inside_low: bool) -> (f32, 
         let width = high - low;
         let change = value_low - value_high;
         let mut share = 0.5_f32;
-        if step % 2 == 0 && change.abs() > 1.0e-37 {
+        // At an end where the field is 0 there need be no crossing.
+        let ends_count = value_low != 0.0 && value_high != 0.0;
+        if step % 2 == 0 && ends_count && change.abs() > 1.0e-37 {
             share = (value_low / change).clamp(0.0, 1.0);
         }
         root = low + width * share;
