@@ -30,10 +30,10 @@ struct Arguments {
     /// Part of an adapter's name; see the example `render --list-adapters`.
     #[arg(long)]
     adapter: Option<String>,
-    /// Only cases whose group or name contains this, and no long run.
+    /// Only cases whose group or name contains this; "long run" is one of them.
     #[arg(long)]
     case: Option<String>,
-    /// Frames of the long run.
+    /// Frames of the long run; 0 leaves it out.
     #[arg(long, default_value_t = 10_000)]
     frames: u32,
     /// Smaller pictures, as in the test suite.
@@ -86,9 +86,10 @@ fn run(arguments: &Arguments) -> Result<bool, Failure> {
     if wanted("refused") {
         rows.push(refusals::measure(&gpu.device, &gpu.queue));
     }
-    let long_run = match arguments.case {
-        Some(_) => None,
-        None => Some(long_run::run(&gpu.device, &gpu.queue, arguments.frames, arguments.seed)?),
+    let long_run = match arguments.frames {
+        0 => None,
+        _ if !wanted("long run") => None,
+        frames => Some(long_run::run(&gpu.device, &gpu.queue, frames, arguments.seed)?),
     };
     output::write(&arguments.out, &origin, &rows, long_run.as_ref(), start.elapsed().as_secs_f64())
 }

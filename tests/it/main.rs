@@ -7,6 +7,7 @@
 
 mod budget;
 mod compare;
+mod counters;
 mod draw;
 mod errors;
 mod invariance;
@@ -15,4 +16,7 @@ mod memory;
 mod published;
 mod reference;
 mod residency;
+mod stability;
+#[path = "../../examples/stability/suite/mod.rs"]
+mod suite;
 mod support;

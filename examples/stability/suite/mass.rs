@@ -93,7 +93,8 @@ pub fn run(
     let mut random = Random::new(seed);
     for case in fields {
         let before = report.violations;
-        field(device, queue, &case, SIZE, pictures, &mut random, &mut report)?;
+        let volume = sealed(&case)?;
+        field(device, queue, &volume, &case, SIZE, pictures, &mut random, &mut report)?;
         report.by_field.push(FieldReport {
             field: case.name,
             rays: pictures * per_picture,
@@ -103,7 +104,7 @@ pub fn run(
     Ok(report)
 }
 
-/// A picture of each field, for tests.
+/// Some pictures of each field, for tests.
 pub fn sample(
     device: &wgpu::Device,
     queue: &wgpu::Queue,
@@ -114,29 +115,37 @@ pub fn sample(
     let mut report = MassReport { seed, ..MassReport::default() };
     let mut random = Random::new(seed);
     for case in fields() {
-        field(device, queue, &case, size, pictures, &mut random, &mut report)?;
+        let volume = sealed(&case)?;
+        field(device, queue, &volume, &case, size, pictures, &mut random, &mut report)?;
     }
     Ok(report)
 }
 
-fn field(
+/// The case's volume, whose ends decoding has left on their sides.
+pub fn sealed(case: &Case) -> Result<Volume, Failure> {
+    let volume = case.volume()?;
+    check_ends(&volume, (case.isovalues)(&volume)[0])?;
+    Ok(volume)
+}
+
+/// Counts the rays of pictures from within.
+pub fn field(
     device: &wgpu::Device,
     queue: &wgpu::Queue,
+    volume: &Volume,
     case: &Case,
     size: [u32; 2],
     pictures: u64,
     random: &mut Random,
     report: &mut MassReport,
 ) -> Result<(), Failure> {
-    let volume = case.volume()?;
-    let isovalue = (case.isovalues)(&volume)[0];
-    check_ends(&volume, isovalue)?;
+    let isovalue = (case.isovalues)(volume)[0];
     let options =
         RendererOptions { size, residency: Residency::Full, ..RendererOptions::default() };
     let mut renderer =
         ProgressiveIsoRenderer::new(device, queue, volume.compressed.clone(), options)?;
     for _ in 0..pictures {
-        let camera = camera(&volume, size, random);
+        let camera = camera(volume, size, random);
         let options = FrameOptions { pass_ms: f32::INFINITY, ..FrameOptions::default() };
         renderer.set_frame(&Frame { camera, isovalues: vec![isovalue], options })?;
         let done = renderer.render_to_completion(device, queue, |_, _| true)?;

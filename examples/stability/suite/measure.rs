@@ -91,7 +91,7 @@ fn pictures(
 }
 
 /// What needs no reference.
-fn whole_picture(case: &Case, picture: &Capture, entered: u32, row: &mut Row) {
+pub fn whole_picture(case: &Case, picture: &Capture, entered: u32, row: &mut Row) {
     let status = picture.status.as_deref().unwrap_or_default();
     let hit: Vec<bool> = status.iter().map(|&s| s == PixelStatus::Hit).collect();
     let hits = hit.iter().filter(|&&hit| hit).count() as u64;
@@ -129,7 +129,7 @@ pub fn cracks(size: [u32; 2], hit: &[bool]) -> u64 {
 }
 
 /// Every pixel, or every `view.stride`-th, against the f64 reference and the twin.
-fn compare(
+pub fn compare(
     case: &Case,
     volume: &Volume,
     view: &View,

@@ -46,8 +46,7 @@ pub fn cases() -> Vec<Case> {
             let inside = 8.0 - distance(p, [10.4, 9.3, 11.7]);
             if inside > 0.0 { inside } else { -1e30 }
         })
-        .at(&[0.5, 4.0, -1e10])
-        .closed(),
+        .at(&[0.5, 4.0, -1e10]),
         limits("unsigned bytes at their limits", 0.0, 255.0, &[0.0, 1.0, 254.5, 255.0]),
         limits("16-bit integers at their limits", -32_768.0, 32_767.0, &[-32_768.0, 0.5, 32_767.0]),
         limits(
