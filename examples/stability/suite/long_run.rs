@@ -13,7 +13,7 @@ use super::random::Random;
 use super::row::Failure;
 use super::views;
 
-const SIZES: [[u32; 2]; 2] = [[61, 43], [33, 50]];
+const SIZES: [[u32; 2]; 2] = [[37, 29], [21, 30]];
 /// Frames between changes of size.
 const RESIZE: u32 = 97;
 /// Frames between comparisons with a fresh renderer, on average.
@@ -67,8 +67,8 @@ pub fn run(
     frames: u32,
     seed: u64,
 ) -> Result<LongRun, Failure> {
-    let volume = Case::new("long run", "gyroid", [37, 42, 35], gyroid).volume()?;
-    let setting = Setting { device, queue, volume, most_slots: 200 };
+    let volume = Case::new("long run", "gyroid", [25, 27, 22], gyroid).volume()?;
+    let setting = Setting { device, queue, volume, most_slots: 130 };
     let mut random = Random::new(seed);
     let mut result = LongRun { frames, bytes: [[u64::MAX, 0]; 2], ..LongRun::default() };
     let mut renderer = setting.renderer(SIZES[0], setting.most_slots)?;
@@ -83,7 +83,7 @@ pub fn run(
         setting.draw(&mut renderer, &frame, which, &mut result)?;
         if number == 0 || random.below(CHECK) == 0 {
             let picture = renderer.capture_blocking(device, queue)?;
-            let slots = u64::from(8 + random.below(300));
+            let slots = u64::from(8 + random.below(200));
             result.checkpoints += 1;
             let same = setting.fresh(&frame, SIZES[which], slots)? == bits(&picture);
             result.different_checkpoints += u32::from(!same);
@@ -138,7 +138,7 @@ impl Setting<'_> {
             }
         };
         let options = FrameOptions {
-            rounds_per_pass: 1 + random.below(16),
+            rounds_per_pass: 1 + random.below(6),
             look_ahead: 1 + random.below(8),
             pass_ms: f32::INFINITY,
             ..FrameOptions::default()

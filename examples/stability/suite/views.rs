@@ -18,7 +18,7 @@ impl Effort {
     pub fn size(self) -> [u32; 2] {
         match self {
             Self::Reduced => [39, 27],
-            Self::Full => [131, 93],
+            Self::Full => [101, 77],
         }
     }
 }
