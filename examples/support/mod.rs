@@ -1,6 +1,6 @@
 //! What the examples share: a device, picture files, reports.
 
-#![allow(dead_code, unreachable_pub, reason = "every example uses a part of this")]
+#![allow(dead_code, unreachable_pub, unused_imports, reason = "every example uses a part of this")]
 
 mod origin;
 mod table;
