@@ -33,9 +33,8 @@ use std::path::PathBuf;
 
 use clap::Parser;
 use measure::Results;
-use output::Origin;
 use scene::Scene;
-use support::{Failure, Gpu};
+use support::{Failure, Gpu, Origin};
 
 /// Measures both strategies on fixed views.
 #[derive(Parser)]

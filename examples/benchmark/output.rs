@@ -1,8 +1,6 @@
 //! Writes `benchmark.json`, `benchmark.md` and the plots.
 
 use std::path::Path;
-use std::process::Command;
-use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::Serialize;
 
@@ -11,25 +9,8 @@ use crate::measure::{Results, Skipped};
 use crate::rows::{Row, medians};
 use crate::scaling::Ratio;
 use crate::summary::Summary;
-use crate::support::{Failure, write_file};
+use crate::support::{Failure, Origin, write_file, write_json};
 use crate::{figures, tables};
-
-/// Where and when something was measured.
-#[derive(Clone, Debug, Serialize)]
-pub struct Origin {
-    pub adapter: String,
-    pub commit: String,
-    /// Day, in universal time.
-    pub date: String,
-    pub command: String,
-}
-
-impl Origin {
-    pub fn new(adapter: String) -> Self {
-        let command = std::env::args().skip(1).collect::<Vec<_>>().join(" ");
-        Self { adapter, commit: commit(), date: today(), command }
-    }
-}
 
 #[derive(Serialize)]
 struct File<'a> {
@@ -54,45 +35,4 @@ pub fn write(folder: &Path, origin: &Origin, results: &Results) -> Result<(), Fa
     let file = File { origin, summary: &summary, rows: &rows, skipped, scaling, frames };
     write_json(folder, "benchmark.json", &file)?;
     figures::write(folder, &rows, frames)
-}
-
-pub fn write_json(folder: &Path, name: &str, value: &impl Serialize) -> Result<(), Failure> {
-    write_file(&folder.join(name), serde_json::to_string_pretty(value)?.as_bytes())
-}
-
-fn commit() -> String {
-    Command::new("git")
-        .args(["describe", "--always", "--dirty"])
-        .output()
-        .ok()
-        .filter(|output| output.status.success())
-        .map_or_else(|| "unknown".into(), |o| String::from_utf8_lossy(&o.stdout).trim().into())
-}
-
-/// The day as year-month-day.
-fn today() -> String {
-    let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
-    let [year, month, day] = civil_day(seconds / 86_400);
-    format!("{year:04}-{month:02}-{day:02}")
-}
-
-/// The Gregorian date of a number of days after 1 January 1970.
-fn civil_day(mut days: u64) -> [u64; 3] {
-    let leap =
-        |year: u64| year.is_multiple_of(4) && !year.is_multiple_of(100) || year.is_multiple_of(400);
-    let mut year = 1970;
-    while days >= 365 + u64::from(leap(year)) {
-        days -= 365 + u64::from(leap(year));
-        year += 1;
-    }
-    let february = 28 + u64::from(leap(year));
-    let mut month = 1;
-    for length in [31, february, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31] {
-        if days < length {
-            break;
-        }
-        days -= length;
-        month += 1;
-    }
-    [year, month, days + 1]
 }

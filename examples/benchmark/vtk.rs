@@ -12,10 +12,11 @@ use volume_io::ReadOptions;
 
 use crate::cpu_volume::CpuVolume;
 use crate::library::{self, Wanted, with_residency};
-use crate::output::{Origin, write_json};
 use crate::scene::{FIELD_OF_VIEW_DEGREES, Scene, View, stream};
 use crate::sets::{MIDDLE, Subject, cube, default_look_ahead, turbulence};
-use crate::support::{Failure, Gpu, reset_resident_peak, resident_bytes, write_file};
+use crate::support::{
+    Failure, Gpu, Origin, reset_resident_peak, resident_bytes, write_file, write_json,
+};
 
 /// Repetitions, each with a new renderer.
 const REPEATS: usize = 5;

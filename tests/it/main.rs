@@ -5,9 +5,9 @@
 #![allow(clippy::unwrap_used, reason = "a failed set-up fails the test")]
 #![allow(clippy::print_stdout, reason = "measured numbers, shown with --nocapture")]
 
-mod bounds;
 mod budget;
 mod compare;
+mod counters;
 mod draw;
 mod errors;
 mod invariance;
@@ -16,4 +16,7 @@ mod memory;
 mod published;
 mod reference;
 mod residency;
+mod stability;
+#[path = "../../examples/stability/suite/mod.rs"]
+mod suite;
 mod support;
