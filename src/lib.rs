@@ -2,6 +2,7 @@
 
 mod capture;
 mod error;
+mod faults;
 mod load;
 mod options;
 mod plan;

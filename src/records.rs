@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use gpu_primitives::memory::Ledger;
-use gpu_primitives::readback::ReadbackRing;
+use gpu_primitives::readback::{Lost, ReadbackRing};
 use wavefront::Statistics;
 use web_time::Instant;
 
@@ -78,6 +78,10 @@ pub(crate) struct PassRecords {
     pub(crate) schedule: Schedule,
     last_report_at: Instant,
     pub(crate) report: PassReport,
+    lost: Option<Lost>,
+    /// The newest frame when an encoder was found to be dropped: what was recorded after it, up to that
+    /// frame, stands on a pass that did not run.
+    broken_frame: u64,
 }
 
 impl PassRecords {
@@ -92,7 +96,19 @@ impl PassRecords {
             schedule: Schedule::default(),
             last_report_at: Instant::now(),
             report: PassReport::default(),
+            lost: None,
+            broken_frame: 0,
         }
+    }
+
+    /// What became of a pass that cannot be made up for, if there was one.
+    pub(crate) fn lost(&self) -> Option<Lost> {
+        self.lost
+    }
+
+    /// Whether the newest frame must start again, because an encoder was dropped.
+    pub(crate) fn is_broken(&self) -> bool {
+        self.broken_frame > 0 && self.broken_frame == self.report.newest_frame
     }
 
     /// Whether another pass may be recorded.
@@ -148,14 +164,35 @@ impl PassRecords {
             let submitted = self.submitted[position];
             // Tags count on from the last one, so that one always stays.
             self.submitted.drain(..position);
-            let mut record = PassRecord::zeroed();
-            let length = submitted.record_bytes.min(bytes.len()).min(size_of::<PassRecord>());
-            bytemuck::bytes_of_mut(&mut record)[..length].copy_from_slice(&bytes[..length]);
-            #[cfg(feature = "wgpu-profiler")]
-            self.profile.take(&bytes[length..]);
-            if submitted.info.pass > 0 {
-                self.take(submitted.info, &record);
+            match bytes {
+                Ok(bytes) => self.take_bytes(&submitted, &bytes),
+                Err(Lost::Dropped) if submitted.info.pass > 0 => self.take_dropped(),
+                Err(lost) => self.lost = self.lost.or(Some(lost)),
             }
+        }
+    }
+
+    fn take_bytes(&mut self, submitted: &Submitted, bytes: &[u8]) {
+        let mut record = PassRecord::zeroed();
+        let length = submitted.record_bytes.min(bytes.len()).min(size_of::<PassRecord>());
+        bytemuck::bytes_of_mut(&mut record)[..length].copy_from_slice(&bytes[..length]);
+        #[cfg(feature = "wgpu-profiler")]
+        self.profile.take(&bytes[length..]);
+        let info = submitted.info;
+        if info.pass > 0 && record.rays.lists == 0 {
+            // The start of a frame lists its rays: no shader has run.
+            self.lost = self.lost.or(Some(Lost::NotRun));
+        } else if info.pass > 0 && info.frame > self.broken_frame {
+            self.take(info, &record);
+        }
+    }
+
+    /// After the frame is complete, a pass changes nothing.
+    fn take_dropped(&mut self) {
+        #[cfg(feature = "wgpu-profiler")]
+        self.profile.drop_oldest();
+        if !self.report.complete() {
+            self.broken_frame = self.report.newest_frame;
         }
     }
 

@@ -10,6 +10,7 @@ mod budget;
 mod compare;
 mod draw;
 mod errors;
+mod faults;
 mod invariance;
 mod left_out;
 mod memory;
