@@ -21,6 +21,9 @@ const CHUNKS: u64 = 4;
 /// watchdog fires.
 const REGIONS_PER_PASS: u64 = 4;
 
+/// Blocks of a region, each decoded once, in dispatches of its own.
+pub(crate) const BLOCKS_PER_REGION: u64 = 33 * 33 * 33;
+
 /// How loading is split.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct LoadPlan {

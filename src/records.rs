@@ -52,6 +52,9 @@ pub(crate) struct PassInfo {
     /// Lists of active rays made before the first round.
     pub(crate) lists_at_start: u32,
     pub(crate) pixels: u32,
+    /// Cells that its walks may visit each, and the time that the pass should take.
+    pub(crate) most_cells: u32,
+    pub(crate) pass_ms: f32,
     pub(crate) dispatches: u32,
     /// When recording began.
     pub(crate) begin: Instant,
@@ -198,20 +201,26 @@ impl PassRecords {
 
     /// Tells the schedule what a pass took that brought the frame to `rounds` rounds: by the GPU's clock
     /// or, without one, from its recording or the report before on.
-    fn take_time(&mut self, info: PassInfo, rounds: u32, gpu_ms: Option<f64>) {
+    fn take_time(&mut self, info: PassInfo, rounds: u32, cut: u32, gpu_ms: Option<f64>) {
         let now = Instant::now();
         let elapsed = now.duration_since(info.begin.max(self.last_report_at));
         self.last_report_at = now;
         let ms = gpu_ms.unwrap_or(1e3 * elapsed.as_secs_f64());
         let same_frame = self.report.frame == info.frame;
         let rounds_before = if same_frame { self.report.rounds } else { 0 };
-        self.schedule.take(rounds.saturating_sub(rounds_before), ms);
+        let cut_before = if same_frame { self.report.cut_walks } else { 0 };
+        let rounds = rounds.saturating_sub(rounds_before);
+        self.schedule.take(rounds, ms);
+        let in_force = info.most_cells == self.schedule.most_cells();
+        if rounds > 0 && cut != cut_before && in_force {
+            self.schedule.calibrate(ms / f64::from(rounds), info.pass_ms);
+        }
     }
 
     fn take(&mut self, info: PassInfo, record: &PassRecord) {
         let gpu_ms = self.timer.milliseconds(record.ticks);
         let rounds = record.rays.lists.saturating_sub(info.lists_at_start);
-        self.take_time(info, rounds, gpu_ms);
+        self.take_time(info, rounds, record.rays.cut, gpu_ms);
         let since = |now: u32, before: u32| now.wrapping_sub(before);
         let report = &mut self.report;
         report.frame = info.frame;
@@ -223,6 +232,9 @@ impl PassRecords {
         report.rays = info.pixels;
         report.entered_rays = record.rays.entered;
         report.active_rays = record.rays.active;
+        report.most_cells = record.rays.most_cells;
+        report.cells_bound = info.most_cells;
+        report.cut_walks = record.rays.cut;
         report.hits = record.rays.hits;
         report.blocks_used = since(record.cache.used, record.cache_before.used);
         report.blocks_requested = since(record.cache.requested, record.cache_before.requested);

@@ -75,6 +75,8 @@ struct FrameState {
     started: bool,
     /// Whether its start forgets what is decoded.
     clears_cache: bool,
+    /// Cells that a walk may visit.
+    most_cells: u32,
     passes: u32,
     rounds: u32,
 }
@@ -150,6 +152,7 @@ impl ProgressiveIsoRenderer {
             cleared: false,
             started: false,
             clears_cache: false,
+            most_cells: 0,
             passes: 0,
             rounds: 0,
         });
@@ -373,7 +376,9 @@ impl ProgressiveIsoRenderer {
             blocks: frame.options.look_ahead,
             first_misses: if warm { WARM_MISSES } else { 0 },
         };
-        let params = state.view.params(grid, lru, isovalue, look_ahead);
+        state.most_cells = self.records.schedule.most_cells();
+        let params =
+            state.view.params(grid, lru, isovalue, look_ahead).with_most_cells(state.most_cells);
         let shading = ShadingParams::new(&frame.options.shading, self.volume.world_from_index);
         rendering.record_start(device, encoder, upload, stages, &params, &shading);
         if let (Some(draw), Some(buffers)) = (&stages.draw, &self.pictures.draw) {
@@ -393,15 +398,25 @@ impl ProgressiveIsoRenderer {
             Phase::Rendering(rendering) => (rendering.counters(), rendering.lists_at_start()),
             _ => (Vec::new(), 0),
         };
-        let (frame, pass, rounds) = match &self.frame {
-            Some(state) if state.started => (state.number, state.passes, state.rounds),
-            _ => (0, 0, 0),
-        };
+        let state = self.frame.as_ref().filter(|state| state.started);
+        let (frame, pass, rounds) = state.map_or((0, 0, 0), |s| (s.number, s.passes, s.rounds));
+        let most_cells = state.map_or(0, |state| state.most_cells);
+        let pass_ms = state.map_or(0.0, |state| state.frame.options.pass_ms);
         let [width, height] = self.options.size;
         let cpu_ms = begin.elapsed().as_secs_f64() * 1e3;
         let pixels = width * height;
-        let info =
-            PassInfo { frame, pass, rounds, lists_at_start, pixels, dispatches, begin, cpu_ms };
+        let info = PassInfo {
+            frame,
+            pass,
+            rounds,
+            lists_at_start,
+            pixels,
+            most_cells,
+            pass_ms,
+            dispatches,
+            begin,
+            cpu_ms,
+        };
         self.records.record_readback(device, encoder, &counters, info);
     }
 
@@ -443,6 +458,7 @@ impl ProgressiveIsoRenderer {
             let progressed = report.frame != last.frame
                 || report.active_rays != last.active_rays
                 || report.blocks_decoded != last.blocks_decoded
+                || report.cut_walks != last.cut_walks
                 || report.pass == 0;
             idle_passes = if progressed { 0 } else { idle_passes + 1 };
             if !each(self, &report) || report.complete() {

@@ -18,3 +18,4 @@ mod published;
 mod reference;
 mod residency;
 mod support;
+mod work;
