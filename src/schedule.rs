@@ -46,7 +46,7 @@ impl Schedule {
     /// next frame's bound is what would take `pass_ms`.
     pub(crate) fn calibrate(&mut self, round_ms: f64, pass_ms: f32) {
         let factor = f64::from(pass_ms) / round_ms.max(1e-3);
-        if !factor.is_nan() {
+        if round_ms.is_finite() && !factor.is_nan() {
             let cells = f64::from(self.most_cells()) * factor.clamp(LEAST_FACTOR, MOST_FACTOR);
             self.most_cells = Some((cells as u32).clamp(LEAST_CELLS, MOST_CELLS));
         }
