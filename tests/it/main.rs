@@ -10,6 +10,7 @@ mod compare;
 mod counters;
 mod draw;
 mod errors;
+mod faults;
 mod invariance;
 mod left_out;
 mod memory;
@@ -20,3 +21,4 @@ mod stability;
 #[path = "../../examples/stability/suite/mod.rs"]
 mod suite;
 mod support;
+mod work;

@@ -35,6 +35,7 @@ fn write_args(active_count: u32) {
     atomicStore(&rays[RAYS_ACTIVE], active_count);
     atomicStore(&rays[RAYS_LISTED], listed);
     atomicAdd(&rays[RAYS_LISTS], 1u);
+    atomicMax(&rays[RAYS_MOST_CELLS], atomicExchange(&rays[RAYS_CELLS], 0u));
     let walk = indirect_fold((listed + 63u) / 64u);
     args[0] = walk.x;
     args[1] = walk.y;

@@ -9,7 +9,7 @@
 #import block_walk
 
 @group(0) @binding(0) var<uniform> frame: FrameParams;
-@group(0) @binding(1) var<storage, read_write> rays: array<u32>;
+@group(0) @binding(1) var<storage, read_write> rays: array<atomic<u32>>;
 @group(0) @binding(2) var<storage, read> masks: array<vec2<u32>>;
 @group(0) @binding(3) var<storage, read> lru_directory: array<u32>;
 @group(0) @binding(4) var<storage, read_write> lru_state: array<atomic<u32>>;
@@ -40,15 +40,23 @@ fn block_use(slot: u32) {
     lru_keep(slot);
 }
 
+var<private> cells: u32; // visited by this ray in this round
+
 // The ray's new state.
-fn walk(grid: MacrocellGrid, ray: DdaRay, state: u32) -> u32 {
+fn walk(grid: MacrocellGrid, ray: DdaRay, state: u32, share: u32) -> u32 {
     let first = frame_unpack(frame, state);
     var place = macrocell_advance(grid, ray, macrocell_enter(grid, ray, first));
     while (macrocell_inside(grid, place.block)) {
+        if (cells > share) {
+            atomicAdd(&rays[RAYS_CUT], 1u);
+            let misses = frame_pack_count(frame, frame_count(frame, state));
+            return RAY_ACTIVE | misses | frame_pack(frame, place.block);
+        }
         block_open(place.block);
         let box = macrocell_box(grid, place.block);
         let start = CellPlace(place.event, macrocell_first_cell(grid, ray, place));
         let result = block_walk(ray, start, box, frame.isovalue, 0u);
+        cells += result.cells + u32(result.hit);
         if (result.hit) {
             return RAY_HIT | frame_pack_count(frame, result.cells) | frame_pack(frame, place.block);
         }
@@ -70,12 +78,15 @@ fn main(
     @builtin(local_invocation_index) lane: u32,
 ) {
     let index = indirect_linear_group(group, groups) * 64u + lane;
-    if (index >= rays[RAYS_LISTED]) {
+    let listed = atomicLoad(&rays[RAYS_LISTED]);
+    if (index >= listed) {
         return;
     }
     lru_begin_keeping();
-    let id = rays[frame_list_word(frame, index)];
+    let id = atomicLoad(&rays[frame_list_word(frame, index)]);
     let ray = frame_ray(frame, frame_pixel(frame, id)).ray;
-    let state = rays[RAYS_HEADER + id];
-    rays[RAYS_HEADER + id] = walk(macrocell_active(frame.grid), ray, state);
+    let state = atomicLoad(&rays[RAYS_HEADER + id]);
+    let share = frame_cells_share(frame, listed);
+    atomicStore(&rays[RAYS_HEADER + id], walk(macrocell_active(frame.grid), ray, state, share));
+    atomicAdd(&rays[RAYS_CELLS], cells);
 }

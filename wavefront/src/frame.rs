@@ -66,9 +66,18 @@ pub struct FrameParams {
     pub(crate) shift_y: u32,
     pub(crate) shift_z: u32,
     pub(crate) shift_misses: u32,
-    pub(crate) pad0: u32,
+    pub(crate) most_cells: u32,
     pub(crate) grid: GridParams,
     pub(crate) lru: LruParams,
+}
+
+impl FrameParams {
+    /// Cells that one walk of all listed rays visits at most, 2^31 if nothing else is said. A ray visits its
+    /// share in a round, and one block at least, so less than 10 per listed ray count as 10.
+    #[must_use]
+    pub fn with_most_cells(self, most_cells: u32) -> Self {
+        Self { most_cells: most_cells.min(MOST_CELLS), ..self }
+    }
 }
 
 /// How many blocks stopped rays of `RunAhead` request.
@@ -84,6 +93,9 @@ impl LookAhead {
     /// Nothing but what a ray needs.
     pub const NONE: Self = Self { blocks: 1, first_misses: 0 };
 }
+
+/// A count of cells stays below 2^32 even if every ray visits its share and one block more.
+const MOST_CELLS: u32 = 1 << 31;
 
 pub(crate) const PARAMS_BYTES: u64 = size_of::<FrameParams>() as u64;
 
@@ -183,7 +195,7 @@ impl FrameView {
             shift_y,
             shift_z,
             shift_misses,
-            pad0: 0,
+            most_cells: MOST_CELLS,
             grid: GridParams::new(grid),
             lru,
         }

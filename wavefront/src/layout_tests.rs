@@ -48,7 +48,7 @@ fn frame_uniforms_have_the_declared_layout() {
         shift_y,
         shift_z,
         shift_misses,
-        pad0,
+        most_cells,
         grid,
         lru,
     });

@@ -55,7 +55,13 @@ pub struct Counters {
     /// Lists of active rays made so far: one by every round that had any, and those of
     /// [`crate::Rounds::lists_at_start`].
     pub lists: u32,
-    pad: [u32; 3],
+    /// Cells that the walk since the last list visited; 0 after a round.
+    pub cells: u32,
+    /// `RunAhead`: most cells that the rays of a walk visited together.
+    pub most_cells: u32,
+    /// `RunAhead`: how often a ray stopped because it had visited its share of
+    /// [`FrameParams::with_most_cells`].
+    pub cut: u32,
 }
 
 impl Counters {
