@@ -14,8 +14,9 @@ pub(crate) struct Schedule {
 /// second for it; watchdogs wait for 2 s and more.
 pub(crate) const FIRST_CELLS: u32 = 1 << 27;
 
-/// Least and most cells of a walk: 16 for each of 2 million rays, and what a counter holds.
-const LEAST_CELLS: u32 = 1 << 25;
+/// Least and most cells of a walk: 32 for each of 2 million rays, with which a round of most views still ends, and
+/// what a counter holds.
+const LEAST_CELLS: u32 = 1 << 26;
 const MOST_CELLS: u32 = 1 << 31;
 
 /// How much the bound may change by one measurement.

@@ -7,6 +7,7 @@
 #import lru_lookup
 #import block_samples
 #import block_walk
+#import work
 
 @group(0) @binding(0) var<uniform> frame: FrameParams;
 @group(0) @binding(1) var<storage, read_write> rays: array<atomic<u32>>;
@@ -40,15 +41,12 @@ fn block_use(slot: u32) {
     lru_keep(slot);
 }
 
-var<private> cells: u32; // visited by this ray in this round
-
 // The ray's new state.
-fn walk(grid: MacrocellGrid, ray: DdaRay, state: u32, share: u32) -> u32 {
+fn walk(grid: MacrocellGrid, ray: DdaRay, state: u32) -> u32 {
     let first = frame_unpack(frame, state);
     var place = macrocell_advance(grid, ray, macrocell_enter(grid, ray, first));
     while (macrocell_inside(grid, place.block)) {
-        if (cells > share) {
-            atomicAdd(&rays[RAYS_CUT], 1u);
+        if (work_is_done()) {
             let misses = frame_pack_count(frame, frame_count(frame, state));
             return RAY_ACTIVE | misses | frame_pack(frame, place.block);
         }
@@ -56,7 +54,7 @@ fn walk(grid: MacrocellGrid, ray: DdaRay, state: u32, share: u32) -> u32 {
         let box = macrocell_box(grid, place.block);
         let start = CellPlace(place.event, macrocell_first_cell(grid, ray, place));
         let result = block_walk(ray, start, box, frame.isovalue, 0u);
-        cells += result.cells + u32(result.hit);
+        work_cells += result.cells + u32(result.hit);
         if (result.hit) {
             return RAY_HIT | frame_pack_count(frame, result.cells) | frame_pack(frame, place.block);
         }
@@ -86,7 +84,7 @@ fn main(
     let id = atomicLoad(&rays[frame_list_word(frame, index)]);
     let ray = frame_ray(frame, frame_pixel(frame, id)).ray;
     let state = atomicLoad(&rays[RAYS_HEADER + id]);
-    let share = frame_cells_share(frame, listed);
-    atomicStore(&rays[RAYS_HEADER + id], walk(macrocell_active(frame.grid), ray, state, share));
-    atomicAdd(&rays[RAYS_CELLS], cells);
+    work_begin(listed);
+    atomicStore(&rays[RAYS_HEADER + id], walk(macrocell_active(frame.grid), ray, state));
+    work_count();
 }

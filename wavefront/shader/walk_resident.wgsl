@@ -5,6 +5,7 @@
 #import macrocell_skip
 #import block_samples
 #import block_walk
+#import work
 
 @group(0) @binding(0) var<uniform> frame: FrameParams;
 @group(0) @binding(1) var<storage, read_write> rays: array<atomic<u32>>;
@@ -28,22 +29,19 @@ fn macrocell_mask(index: u32) -> vec2<u32> {
     return masks[index];
 }
 
-var<private> cells: u32; // visited by this ray in this round
-
 // The ray's new state.
-fn walk(grid: MacrocellGrid, ray: DdaRay, first_block: vec3<i32>, share: u32) -> u32 {
+fn walk(grid: MacrocellGrid, ray: DdaRay, first_block: vec3<i32>) -> u32 {
     var place = macrocell_advance(
         grid, ray, macrocell_enter(grid, ray, first_block));
     while (macrocell_inside(grid, place.block)) {
-        if (cells > share) {
-            atomicAdd(&rays[RAYS_CUT], 1u);
+        if (work_is_done()) {
             return RAY_ACTIVE | frame_pack(frame, place.block);
         }
         block_open(place.block);
         let box = macrocell_box(grid, place.block);
         let start = CellPlace(place.event, macrocell_first_cell(grid, ray, place));
         let result = block_walk(ray, start, box, frame.isovalue, 0u);
-        cells += result.cells + u32(result.hit);
+        work_cells += result.cells + u32(result.hit);
         if (result.hit) {
             return RAY_HIT | frame_pack_count(frame, result.cells) | frame_pack(frame, place.block);
         }
@@ -67,7 +65,7 @@ fn main(
     let id = atomicLoad(&rays[frame_list_word(frame, index)]);
     let ray = frame_ray(frame, frame_pixel(frame, id)).ray;
     let block = frame_unpack(frame, atomicLoad(&rays[RAYS_HEADER + id]));
-    let share = frame_cells_share(frame, listed);
-    atomicStore(&rays[RAYS_HEADER + id], walk(macrocell_active(frame.grid), ray, block, share));
-    atomicAdd(&rays[RAYS_CELLS], cells);
+    work_begin(listed);
+    atomicStore(&rays[RAYS_HEADER + id], walk(macrocell_active(frame.grid), ray, block));
+    work_count();
 }

@@ -18,6 +18,7 @@ const FRAME: Module = Module { name: "frame", source: include_str!("../shader/li
 const CELL: Module = Module { name: "cell", source: include_str!("../shader/lib/cell.wgsl") };
 const BLOCK_WALK: Module =
     Module { name: "block_walk", source: include_str!("../shader/lib/block_walk.wgsl") };
+const WORK: Module = Module { name: "work", source: include_str!("../shader/lib/work.wgsl") };
 const LIST: Module = Module { name: "list", source: include_str!("../shader/list.wgsl") };
 const BLOCK_NEED: Module =
     Module { name: "block_need", source: include_str!("../shader/lib/block_need.wgsl") };
@@ -59,7 +60,7 @@ pub struct Counters {
     pub cells: u32,
     /// `RunAhead`: most cells that the rays of a walk visited together.
     pub most_cells: u32,
-    /// `RunAhead`: how often a ray stopped because it had visited its share of
+    /// `RunAhead`: how often a ray stopped because all together had visited
     /// [`FrameParams::with_most_cells`].
     pub cut: u32,
 }
@@ -85,6 +86,7 @@ pub(crate) fn library(samples: SampleLayout) -> Vec<Module> {
         CELL,
         BLOCK_NEED,
         BLOCK_WALK,
+        WORK,
         samples.module(),
         OUTPUTS,
         indirect::MODULE,

@@ -89,17 +89,8 @@ const RAYS_LISTED: u32 = 3u;   // length of the active list
 const RAYS_LISTS: u32 = 4u;    // lists made so far in the frame; none is made when no ray is active
 const RAYS_CELLS: u32 = 5u;      // RunAhead: cells that the walk since the last list visited
 const RAYS_MOST_CELLS: u32 = 6u; // the most of any walk of the frame
-const RAYS_CUT: u32 = 7u;        // walks of a ray, so far in the frame, that ended because they visited their share
+const RAYS_CUT: u32 = 7u;        // walks of a ray, so far in the frame, that the bound ended
 const RAYS_HEADER: u32 = 8u;
-
-// Cells of a block on any ray: it crosses at most 3 planes between cells on each axis.
-const BLOCK_MOST_CELLS: u32 = 10u;
-
-// Cells after which a ray goes on in the next round: so few that all listed rays, each with another block,
-// stay within the frame's bound.
-fn frame_cells_share(frame: FrameParams, listed: u32) -> u32 {
-    return max(frame.most_cells / max(listed, 1u), BLOCK_MOST_CELLS) - BLOCK_MOST_CELLS;
-}
 
 // The word that holds the active bit of a ray, which is its number's lowest five bits.
 fn frame_active_word(frame: FrameParams, ray: u32) -> u32 {
