@@ -55,9 +55,9 @@ fn both_residencies_make_the_same_picture() {
             let again = gpu.finish(&mut renderer, &frame);
             same_picture(&again, &cached).unwrap();
             let report = renderer.poll_report();
-            // None where the volume has no cell.
-            let rounds = u32::from(dims.iter().all(|&n| n > 1));
-            assert_eq!((report.pass, report.rounds), (1, rounds), "{name}");
+            // None where no ray meets an active block.
+            assert_eq!(report.pass, 1, "{name}");
+            assert!(report.rounds <= 1 && (report.hits == 0 || report.rounds == 1), "{report:?}");
         }
     }
 }
