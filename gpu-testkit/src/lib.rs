@@ -9,7 +9,10 @@ pub mod gpu;
 pub mod image;
 pub mod judge;
 pub mod layout;
+pub mod picture;
 mod property;
 pub mod reference;
+mod ssim;
+pub mod statistics;
 
 pub use property::property;
