@@ -17,28 +17,34 @@ struct ActiveBoxParams {
 
 const LANES: u32 = 256u;
 
+// Behind the last child of any volume: the first child where nothing is active.
+const NO_CHILD: i32 = 0x1000000;
+
 // First child and the one after the last, on each axis.
 var<workgroup> low: array<atomic<i32>, 3>;
 var<workgroup> high: array<atomic<i32>, 3>;
 
+// Which of four numbers are not 0, a bit for each.
+fn not_zero(parts: vec4<u32>) -> u32 {
+    return dot(select(vec4<u32>(0u), vec4<u32>(1u, 2u, 4u, 8u), parts != vec4<u32>(0u)), vec4<u32>(1u));
+}
+
 // Which of 0 .. 3 the children of a mask take, a bit for each, on each axis.
 fn taken(mask: vec2<u32>) -> vec3<u32> {
     let layers = vec4<u32>(mask.x & 0xffffu, mask.x >> 16u, mask.y & 0xffffu, mask.y >> 16u);
-    let z = dot(select(vec4<u32>(0u), vec4<u32>(1u, 2u, 4u, 8u), layers != vec4<u32>(0u)), vec4<u32>(1u));
     let layer = layers.x | layers.y | layers.z | layers.w;
     let rows = vec4<u32>(layer & 15u, (layer >> 4u) & 15u, (layer >> 8u) & 15u, layer >> 12u);
-    let y = dot(select(vec4<u32>(0u), vec4<u32>(1u, 2u, 4u, 8u), rows != vec4<u32>(0u)), vec4<u32>(1u));
-    return vec3<u32>(rows.x | rows.y | rows.z | rows.w, y, z);
+    return vec3<u32>(rows.x | rows.y | rows.z | rows.w, not_zero(rows), not_zero(layers));
 }
 
 @compute @workgroup_size(256)
 fn main(@builtin(local_invocation_index) lane: u32) {
     if (lane < 3u) {
-        atomicStore(&low[lane], 0x7fffffff);
+        atomicStore(&low[lane], NO_CHILD);
         atomicStore(&high[lane], 0);
     }
     workgroupBarrier();
-    var mine_low = vec3<i32>(0x7fffffff);
+    var mine_low = vec3<i32>(NO_CHILD);
     var mine_high = vec3<i32>(0);
     let size = params.cells;
     for (var index = lane; index < size.x * size.y * size.z; index += LANES) {
@@ -57,9 +63,7 @@ fn main(@builtin(local_invocation_index) lane: u32) {
     workgroupBarrier();
     if (lane == 0u) {
         let shift = vec3<u32>(params.child_shift);
-        // Where nothing is active the first block lies behind the last cell.
-        let children = min(
-            vec3<i32>(atomicLoad(&low[0]), atomicLoad(&low[1]), atomicLoad(&low[2])), vec3<i32>(1 << 24u));
+        let children = vec3<i32>(atomicLoad(&low[0]), atomicLoad(&low[1]), atomicLoad(&low[2]));
         let first = bitcast<vec3<u32>>(children << shift);
         let end = vec3<i32>(atomicLoad(&high[0]), atomicLoad(&high[1]), atomicLoad(&high[2])) << shift;
         let last = bitcast<vec3<u32>>(min(4 * end - vec3<i32>(1), params.last_cell));

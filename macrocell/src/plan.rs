@@ -119,8 +119,7 @@ impl MacrocellPlan {
 
     /// The region with number `index`, x fastest.
     pub fn region(&self, index: u64) -> Region {
-        let [nx, ny, _] = self.region_grid().map(u64::from);
-        let position = [index % nx, index / nx % ny, index / (nx * ny)].map(|p| p as u32);
+        let position = crate::grid::position(index, self.region_grid());
         let (coarse, size) = (self.grid.coarse(), self.region_coarse());
         let coarse_origin: [u32; 3] = std::array::from_fn(|a| position[a] * size[a]);
         let coarse_size = std::array::from_fn(|a| size[a].min(coarse[a] - coarse_origin[a]));

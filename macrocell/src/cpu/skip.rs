@@ -29,18 +29,11 @@ impl Masks {
     /// First block and last dual cell, on each axis, of the box of all active blocks, to the granularity of
     /// the coarsest level's children; twin of `shader/active_box.wgsl`.
     pub fn active_box(&self, grid: &Grid) -> [[i32; 3]; 2] {
-        let (first, size, edge) = if grid.has_third_level() {
-            (grid.coarse_count(), grid.third(), 4)
-        } else {
-            (0, grid.coarse(), 1)
-        };
+        let third = grid.has_third_level();
+        let (first, edge) = if third { (grid.coarse_count(), 4) } else { (0, 1) };
         let (mut low, mut high) = ([1 << 24; 3], [0; 3]);
-        for (index, &mask) in self.words[first as usize..].iter().enumerate() {
-            let cell = [
-                index as u32 % size[0],
-                index as u32 / size[0] % size[1],
-                index as u32 / (size[0] * size[1]),
-            ];
+        for (index, &mask) in (0u64..).zip(&self.words[first as usize..]) {
+            let cell = if third { grid.third_position(index) } else { grid.coarse_position(index) };
             for child in (0..64u32).filter(|child| (mask >> child) & 1 != 0) {
                 for axis in 0..3 {
                     let place = (4 * cell[axis] + ((child >> (2 * axis)) & 3)) as i32;
