@@ -1,5 +1,7 @@
 //! How many rounds a pass gets, so that no submission takes long.
 
+use wavefront::FrameParams;
+
 /// Rounds of a pass by measured time.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Schedule {
@@ -14,10 +16,8 @@ pub(crate) struct Schedule {
 /// second for it; watchdogs wait for 2 s and more.
 pub(crate) const FIRST_CELLS: u32 = 1 << 27;
 
-/// Least and most cells of a walk: 32 for each of 2 million rays, with which a round of most views still ends, and
-/// what a counter holds.
+/// Least cells of a walk: 32 for each of 2 million rays, with which a round of most views still ends.
 const LEAST_CELLS: u32 = 1 << 26;
-const MOST_CELLS: u32 = 1 << 31;
 
 /// How much the bound may change by one measurement.
 const LEAST_FACTOR: f64 = 0.25;
@@ -49,7 +49,7 @@ impl Schedule {
         let factor = f64::from(pass_ms) / round_ms.max(1e-3);
         if round_ms.is_finite() && !factor.is_nan() {
             let cells = f64::from(self.most_cells()) * factor.clamp(LEAST_FACTOR, MOST_FACTOR);
-            self.most_cells = Some((cells as u32).clamp(LEAST_CELLS, MOST_CELLS));
+            self.most_cells = Some((cells as u32).clamp(LEAST_CELLS, FrameParams::MOST_CELLS));
         }
     }
 
@@ -82,7 +82,7 @@ mod tests {
         for _ in 0..40 {
             schedule.calibrate(0.0, f32::INFINITY);
         }
-        assert_eq!(schedule.most_cells(), MOST_CELLS);
+        assert_eq!(schedule.most_cells(), FrameParams::MOST_CELLS);
     }
 
     #[test]

@@ -72,11 +72,14 @@ pub struct FrameParams {
 }
 
 impl FrameParams {
-    /// Cells that one walk of all listed rays visits at most, 2^31 if nothing else is said. A ray visits its
-    /// share in a round, and one block at least, so less than 10 per listed ray count as 10.
+    /// Most that a bound on the cells of a walk may be: so a count of cells stays far below 2^32.
+    pub const MOST_CELLS: u32 = 1 << 31;
+
+    /// Cells that one walk of all listed rays visits at most, [`Self::MOST_CELLS`] if nothing else is said. A
+    /// ray visits one block at least in a round, so less than 10 per listed ray count as 10.
     #[must_use]
     pub fn with_most_cells(self, most_cells: u32) -> Self {
-        Self { most_cells: most_cells.min(MOST_CELLS), ..self }
+        Self { most_cells: most_cells.min(Self::MOST_CELLS), ..self }
     }
 }
 
@@ -93,9 +96,6 @@ impl LookAhead {
     /// Nothing but what a ray needs.
     pub const NONE: Self = Self { blocks: 1, first_misses: 0 };
 }
-
-/// A count of cells stays below 2^32 even if every ray visits its share and one block more.
-const MOST_CELLS: u32 = 1 << 31;
 
 pub(crate) const PARAMS_BYTES: u64 = size_of::<FrameParams>() as u64;
 
@@ -195,7 +195,7 @@ impl FrameView {
             shift_y,
             shift_z,
             shift_misses,
-            most_cells: MOST_CELLS,
+            most_cells: FrameParams::MOST_CELLS,
             grid: GridParams::new(grid),
             lru,
         }
