@@ -16,7 +16,7 @@ type Outcome = Pin<Box<dyn Future<Output = Option<wgpu::Error>>>>;
 
 /// What a piece of work makes; decides what a refusal is called.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Work {
+pub(crate) enum Task {
     /// Shaders and pipelines.
     Pipelines,
     /// Memory, bind groups, commands.
@@ -28,7 +28,7 @@ pub(crate) enum Work {
 #[must_use]
 pub(crate) struct Scopes {
     device: wgpu::Device,
-    work: Work,
+    task: Task,
     // Closed, and dropped where an error leads out of the work, in this order: that of opening, backwards.
     memory: wgpu::ErrorScopeGuard,
     validation: wgpu::ErrorScopeGuard,
@@ -36,11 +36,11 @@ pub(crate) struct Scopes {
 }
 
 impl Scopes {
-    pub(crate) fn open(device: &wgpu::Device, work: Work) -> Self {
+    pub(crate) fn open(device: &wgpu::Device, task: Task) -> Self {
         let internal = device.push_error_scope(wgpu::ErrorFilter::Internal);
         let validation = device.push_error_scope(wgpu::ErrorFilter::Validation);
         let memory = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
-        Self { device: device.clone(), work, memory, validation, internal }
+        Self { device: device.clone(), task, memory, validation, internal }
     }
 
     /// What comes of them. Want of memory comes first: what else is refused is refused because of it.
@@ -55,18 +55,18 @@ impl Scopes {
 pub(crate) struct Faults {
     first: Option<Error>,
     /// Empty but in browsers, which answer later.
-    pending: Mutex<Vec<(Work, Outcome)>>,
+    pending: Mutex<Vec<(Task, Outcome)>>,
 }
 
 impl Faults {
-    /// Does `work` within scopes; its own error gives way to what the device says, which is the cause.
+    /// Does a task within scopes; its own error gives way to what the device says, which is the cause.
     pub(crate) fn guard<T>(
         &mut self,
         device: &wgpu::Device,
-        work: Work,
+        task: Task,
         does: impl FnOnce() -> Result<T, Error>,
     ) -> Result<T, Error> {
-        let scopes = Scopes::open(device, work);
+        let scopes = Scopes::open(device, task);
         let done = does();
         self.close(scopes)?;
         done
@@ -77,8 +77,8 @@ impl Faults {
     /// # Errors
     /// As [`Faults::check`].
     pub(crate) fn close(&mut self, scopes: Scopes) -> Result<(), Error> {
-        let (device, work) = (scopes.device.clone(), scopes.work);
-        self.pending().extend(scopes.outcomes().map(|outcome| (work, outcome)));
+        let (device, task) = (scopes.device.clone(), scopes.task);
+        self.pending().extend(scopes.outcomes().map(|outcome| (task, outcome)));
         let known = self.first.is_some();
         let found = self.check();
         // A lost device makes nothing without a word, and then refuses what is done with it.
@@ -93,11 +93,11 @@ impl Faults {
     /// The first fault, if one is known: it stays.
     pub(crate) fn check(&mut self) -> Result<(), Error> {
         let mut found = None;
-        self.pending().retain_mut(|(work, outcome)| match poll(outcome) {
+        self.pending().retain_mut(|(task, outcome)| match poll(outcome) {
             Poll::Pending => true,
             Poll::Ready(None) => false,
             Poll::Ready(Some(error)) => {
-                found.get_or_insert_with(|| typed(*work, error));
+                found.get_or_insert_with(|| typed(*task, error));
                 false
             }
         });
@@ -119,7 +119,7 @@ impl Faults {
         self.check()
     }
 
-    fn pending(&mut self) -> &mut Vec<(Work, Outcome)> {
+    fn pending(&mut self) -> &mut Vec<(Task, Outcome)> {
         // Whole between any two statements, so a poisoned lock does no harm.
         self.pending.get_mut().unwrap_or_else(PoisonError::into_inner)
     }
@@ -135,16 +135,16 @@ fn poll(outcome: &mut Outcome) -> Poll<Option<wgpu::Error>> {
     outcome.as_mut().poll(&mut Context::from_waker(Waker::noop()))
 }
 
-fn typed(work: Work, error: wgpu::Error) -> Error {
-    match (error, work) {
+fn typed(task: Task, error: wgpu::Error) -> Error {
+    match (error, task) {
         (wgpu::Error::OutOfMemory { source }, _) => Error::OutOfMemory { message: chain(&*source) },
         (
             wgpu::Error::Validation { description, .. } | wgpu::Error::Internal { description, .. },
-            Work::Pipelines,
+            Task::Pipelines,
         ) => Error::ShaderRefused { message: description },
         (
             wgpu::Error::Validation { description, .. } | wgpu::Error::Internal { description, .. },
-            Work::Other,
+            Task::Other,
         ) => Error::Refused { message: description },
     }
 }
@@ -168,7 +168,7 @@ fn chain(error: &dyn std::error::Error) -> String {
 /// Whether the device is lost: it makes nothing any more and reports no error for it. Browsers make
 /// mapped buffers even then and do not tell.
 pub(crate) fn is_lost(device: &wgpu::Device) -> bool {
-    let scopes = Scopes::open(device, Work::Other);
+    let scopes = Scopes::open(device, Task::Other);
     // Gone at the end of this function, so not counted.
     let probe = device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("progressive-iso.probe"),

@@ -1,5 +1,7 @@
 #![doc = include_str!("../README.md")]
 
+#[cfg(not(target_arch = "wasm32"))]
+mod blocking;
 mod capture;
 mod error;
 mod faults;

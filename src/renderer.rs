@@ -7,7 +7,7 @@ use wavefront::{FrameView, LookAhead, OutputTextures, ShadingParams};
 use web_time::Instant;
 
 use crate::capture::PendingCapture;
-use crate::faults::{Faults, Scopes, Work, is_lost};
+use crate::faults::{Faults, Scopes, Task, is_lost};
 use crate::load::{LoadStages, Loader};
 use crate::plan::PARAMS_CHUNK;
 use crate::records::{PassInfo, PassRecords};
@@ -102,11 +102,11 @@ impl ProgressiveIsoRenderer {
         let plan = ScenePlan::new(&volume, &options, &limits)?;
         let ledger = Ledger::new();
         let mut faults = Faults::default();
-        let (stages, load_stages) = faults.guard(device, Work::Pipelines, || {
+        let (stages, load_stages) = faults.guard(device, Task::Pipelines, || {
             Ok((Stages::new(device, &plan, &options)?, LoadStages::new(device, &plan)?))
         })?;
         let upload = UploadRing::new(&ledger, "progressive-iso.upload", PARAMS_CHUNK);
-        let (buffers, pictures, loader, records) = faults.guard(device, Work::Other, || {
+        let (buffers, pictures, loader, records) = faults.guard(device, Task::Other, || {
             let buffers = VolumeBuffers::new(device, &ledger, &stages, &plan);
             let pictures = Pictures::new(device, &ledger, &stages, &plan);
             let loader = Loader::new(device, &ledger, &plan, &buffers, load_stages)?;
@@ -176,7 +176,7 @@ impl ProgressiveIsoRenderer {
         device: &wgpu::Device,
         queue: &wgpu::Queue,
     ) -> Result<PassReport, Error> {
-        let scopes = Scopes::open(device, Work::Other);
+        let scopes = Scopes::open(device, Task::Other);
         let report = self.submit_pass(device, queue);
         self.faults.close(scopes)?;
         report
@@ -219,7 +219,7 @@ impl ProgressiveIsoRenderer {
         if self.frame.is_none() {
             return Err(Error::NoFrame);
         }
-        let scopes = Scopes::open(device, Work::Other);
+        let scopes = Scopes::open(device, Task::Other);
         let report = self.record_pass(device, encoder);
         self.faults.close(scopes)?;
         report
@@ -237,7 +237,7 @@ impl ProgressiveIsoRenderer {
     }
 
     /// [`Self::collect`], and what went wrong by then.
-    fn check(&mut self, device: &wgpu::Device) -> Result<(), Error> {
+    pub(crate) fn check(&mut self, device: &wgpu::Device) -> Result<(), Error> {
         self.collect();
         self.faults.check()?;
         // A device that is lost says so in no other way than by what it does not do.
@@ -420,7 +420,7 @@ impl ProgressiveIsoRenderer {
         self.records.record_readback(device, encoder, &counters, info);
     }
 
-    fn report(&self, submitted: bool) -> PassReport {
+    pub(crate) fn report(&self, submitted: bool) -> PassReport {
         PassReport {
             submitted,
             bytes: self.ledger.total(),
@@ -433,43 +433,6 @@ impl ProgressiveIsoRenderer {
     pub fn poll_report(&mut self) -> PassReport {
         self.collect();
         self.report(false)
-    }
-
-    /// Renders passes until the frame is complete, blocking on the device: for offline use.
-    /// `each` sees every report; returning false stops early.
-    ///
-    /// # Errors
-    /// If no frame is set, the device fails, or passes stop making progress.
-    #[cfg(not(target_arch = "wasm32"))]
-    pub fn render_to_completion(
-        &mut self,
-        device: &wgpu::Device,
-        queue: &wgpu::Queue,
-        mut each: impl FnMut(&Self, &PassReport) -> bool,
-    ) -> Result<PassReport, Error> {
-        const PATIENCE: u32 = 256;
-        let mut idle_passes = 0;
-        let mut last = self.report(false);
-        loop {
-            self.render_pass(device, queue)?;
-            wait(device)?;
-            self.check(device)?;
-            let report = self.report(false);
-            let progressed = report.frame != last.frame
-                || report.active_rays != last.active_rays
-                || report.blocks_decoded != last.blocks_decoded
-                || report.cut_walks != last.cut_walks
-                || report.pass == 0;
-            idle_passes = if progressed { 0 } else { idle_passes + 1 };
-            if !each(self, &report) || report.complete() {
-                return Ok(report);
-            }
-            if idle_passes >= PATIENCE {
-                let active_rays = report.active_rays;
-                return Err(Error::Stalled { passes: idle_passes, active_rays });
-            }
-            last = report;
-        }
     }
 
     /// Draws the surface pixels known so far into the caller's pass, with depth, so that they and
@@ -500,36 +463,9 @@ impl ProgressiveIsoRenderer {
         if !self.options.capture {
             return Err(Error::CaptureNotPlanned);
         }
-        Faults::default().guard(device, Work::Other, || {
+        Faults::default().guard(device, Task::Other, || {
             Ok(PendingCapture::record(device, &self.ledger, encoder, &self.pictures.textures))
         })
-    }
-
-    /// Reads the pictures back, blocking on the device: for offline use.
-    ///
-    /// # Errors
-    /// Without [`RendererOptions::capture`], or if the device fails.
-    #[cfg(not(target_arch = "wasm32"))]
-    pub fn capture_blocking(
-        &self,
-        device: &wgpu::Device,
-        queue: &wgpu::Queue,
-    ) -> Result<crate::Capture, Error> {
-        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
-            label: Some("progressive-iso.capture"),
-        });
-        let mut pending = self.capture(device, &mut encoder)?;
-        Faults::default().guard(device, Work::Other, || {
-            #[expect(
-                clippy::disallowed_methods,
-                reason = "the facade submits on behalf of the caller"
-            )]
-            queue.submit([encoder.finish()]);
-            Ok(())
-        })?;
-        wait(device)?;
-        let lost = || if is_lost(device) { Error::DeviceLost } else { Error::MapFailed };
-        pending.try_take().ok_or_else(lost)
     }
 
     /// Forgets all decoded blocks when the next frame starts, as if the volume had just been loaded:
@@ -551,11 +487,11 @@ impl ProgressiveIsoRenderer {
         if (layout, strategy) != (self.plan.samples.layout(), self.plan.strategy) {
             self.stages = self
                 .faults
-                .guard(device, Work::Pipelines, || Stages::new(device, &plan, &options))?;
+                .guard(device, Task::Pipelines, || Stages::new(device, &plan, &options))?;
         }
         // What goes does so before anything comes, or both together would exceed the budget.
         self.release_rays(plan.samples == self.plan.samples);
-        self.faults.guard(device, Work::Other, || {
+        self.faults.guard(device, Task::Other, || {
             self.pictures.resize(device, &self.ledger, &self.stages, &plan);
             Ok(())
         })?;
@@ -628,11 +564,4 @@ impl ProgressiveIsoRenderer {
     pub fn volume(&self) -> &CompressedVolume {
         &self.volume
     }
-}
-
-#[cfg(not(target_arch = "wasm32"))]
-fn wait(device: &wgpu::Device) -> Result<(), Error> {
-    #[expect(clippy::disallowed_methods, reason = "offline use blocks by request")]
-    let result = device.poll(wgpu::PollType::wait_indefinitely());
-    result.map(|_| ()).map_err(|error| Error::Device(error.to_string()))
 }
