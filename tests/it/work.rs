@@ -4,19 +4,17 @@ use std::time::Instant;
 
 use progressive_iso::{Camera, FrameOptions, PassReport, RendererOptions, Residency};
 
-use crate::support::{Gpu, Scene, options};
+use crate::suite::random::Random;
+use crate::support::{Gpu, Scene, aspect, options};
 
 /// As many rays as are walked at a time.
 const SIZE: [u32; 2] = [1920, 1088];
 
 /// White noise, and an isovalue above all but 1 % of it.
 fn noise(dims: [u32; 3]) -> Scene {
-    let mut state = 1u64;
-    let mut next = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-        (state >> 40) as f32 / (1u64 << 24) as f32
-    };
-    let samples: Vec<f32> = (0..dims.iter().product()).map(|_: u32| next()).collect();
+    let mut random = Random::new(1);
+    let samples: Vec<f32> =
+        (0..dims.iter().product()).map(|_: u32| random.between(0.0, 1.0) as f32).collect();
     let mut scene = Scene::generated("gyroid", dims, 8.0);
     scene.volume = volume_io::encode(&samples, dims, 8.0).unwrap();
     let mut sorted = scene.volume.decode();
@@ -37,8 +35,7 @@ fn work_stays_within_the_bound_in_dense_noise() {
         let mut renderer = gpu.renderer(&scene, options);
         // So near that every ray enters.
         let (center, radius) = scene.compressed().bounding_ball();
-        let aspect = f64::from(SIZE[0]) / f64::from(SIZE[1]);
-        let camera = Camera::orbit(center, 0.3 * radius, 33.0, 21.0, 40.0, aspect);
+        let camera = Camera::orbit(center, 0.3 * radius, 33.0, 21.0, 40.0, aspect(SIZE));
         let mut frame = scene.frame(camera);
         frame.options = FrameOptions { rounds_per_pass: 1, ..frame.options };
         let bound = renderer.plan().work().blocks_decoded;

@@ -86,25 +86,12 @@ pub fn run(
     rays: u64,
     seed: u64,
 ) -> Result<MassReport, Failure> {
-    let fields = fields();
     let per_picture = u64::from(SIZE[0] * SIZE[1]);
-    let pictures = rays.div_ceil(per_picture).div_ceil(fields.len() as u64);
-    let mut report = MassReport { seed, ..MassReport::default() };
-    let mut random = Random::new(seed);
-    for case in fields {
-        let before = report.violations;
-        let volume = sealed(&case)?;
-        field(device, queue, &volume, &case, SIZE, pictures, &mut random, &mut report)?;
-        report.by_field.push(FieldReport {
-            field: case.name,
-            rays: pictures * per_picture,
-            violations: report.violations - before,
-        });
-    }
-    Ok(report)
+    let pictures = rays.div_ceil(per_picture).div_ceil(fields().len() as u64);
+    sample(device, queue, SIZE, pictures, seed)
 }
 
-/// Some pictures of each field, for tests.
+/// Some pictures of each field.
 pub fn sample(
     device: &wgpu::Device,
     queue: &wgpu::Queue,
@@ -115,8 +102,14 @@ pub fn sample(
     let mut report = MassReport { seed, ..MassReport::default() };
     let mut random = Random::new(seed);
     for case in fields() {
+        let (rays, violations) = (report.rays, report.violations);
         let volume = sealed(&case)?;
         field(device, queue, &volume, &case, size, pictures, &mut random, &mut report)?;
+        report.by_field.push(FieldReport {
+            field: case.name,
+            rays: report.rays - rays,
+            violations: report.violations - violations,
+        });
     }
     Ok(report)
 }
