@@ -55,7 +55,7 @@ fn work_stays_within_the_bound_in_dense_noise() {
             let (device, queue) = (&gpu.device, &gpu.queue);
             let report =
                 renderer.render_to_completion(device, queue, |_, report| check(report)).unwrap();
-            assert!(report.complete());
+            assert!(report.complete() && report.most_cells > report.entered_rays, "{report:?}");
             cut_walks += report.cut_walks;
             println!(
                 "{residency:?}: {} rounds, worst step {worst_ms:.0} ms, at most {} of {} cells, {} cut",
