@@ -43,7 +43,7 @@ impl ProgressiveIsoRenderer {
     /// Reads the pictures back, blocking on the device: for offline use.
     ///
     /// # Errors
-    /// Without [`RendererOptions::capture`], or if the device fails.
+    /// Without [`RendererOptions::capture`](crate::RendererOptions::capture), or if the device fails.
     pub fn capture_blocking(
         &self,
         device: &wgpu::Device,
