@@ -50,6 +50,11 @@ enum Kind {
     Status,
 }
 
+/// What a staging buffer ends with until the GPU has filled it: a submission that is refused leaves it
+/// there and the buffer is mapped all the same.
+const NOT_RUN: u32 = 1;
+const STAMP_BYTES: u64 = size_of::<u32>() as u64;
+
 const WAITING: u8 = 0;
 const MAPPED: u8 = 1;
 const LOST: u8 = 2;
@@ -62,9 +67,25 @@ fn padded_row(width: u32, bytes_per_pixel: u64) -> u64 {
 pub(crate) fn bytes(plan: &WavefrontPlan) -> u64 {
     let ([width, height], outputs) = (plan.size(), plan.outputs());
     let sizes = [(true, 4), (outputs.depth, 4), (outputs.normal, 8), (outputs.status, 4)];
-    let row: u64 =
-        sizes.iter().filter(|(has, _)| *has).map(|&(_, bytes)| padded_row(width, bytes)).sum();
-    row * u64::from(height)
+    let there = sizes.iter().filter(|(has, _)| *has);
+    there.map(|&(_, bytes)| padded_row(width, bytes) * u64::from(height) + STAMP_BYTES).sum()
+}
+
+/// A staging buffer that says that it is not filled.
+fn staging(device: &wgpu::Device, ledger: &Ledger, bytes: u64) -> Buffer {
+    let desc = wgpu::BufferDescriptor {
+        label: Some("progressive-iso.capture"),
+        size: bytes + STAMP_BYTES,
+        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: true,
+    };
+    let buffer = ledger.buffer(device, Category::Readback, &desc);
+    match buffer.get_mapped_range_mut(bytes..) {
+        Ok(mut view) => view.copy_from_slice(&NOT_RUN.to_le_bytes()),
+        Err(error) => tracing::warn!(%error, "a new buffer is not mapped"),
+    }
+    buffer.unmap();
+    buffer
 }
 
 impl PendingCapture {
@@ -92,7 +113,7 @@ impl PendingCapture {
 
     /// The pictures, once the GPU has delivered them; `None` before. Gives them once.
     ///
-    /// A device that is lost delivers nothing.
+    /// A device that is lost or refuses the submission delivers nothing.
     pub fn try_take(&mut self) -> Option<Capture> {
         let ready = |p: &Picture| p.state.load(Ordering::Acquire) == MAPPED;
         if self.pictures.is_empty() || !self.pictures.iter().all(ready) {
@@ -100,8 +121,9 @@ impl PendingCapture {
         }
         let mut capture =
             Capture { size: self.size, color: Vec::new(), depth: None, normal: None, status: None };
-        for picture in std::mem::take(&mut self.pictures) {
-            let bytes = picture.pixels(self.size)?;
+        let delivered = self.pictures.iter().map(|picture| picture.pixels(self.size));
+        let delivered = delivered.collect::<Option<Vec<_>>>()?;
+        for (picture, bytes) in std::mem::take(&mut self.pictures).iter().zip(delivered) {
             match picture.kind {
                 Kind::Color => capture.color = bytes,
                 Kind::Depth => capture.depth = Some(depths(&bytes)),
@@ -128,16 +150,8 @@ impl Picture {
     ) -> Self {
         let pixel = u64::from(texture.format().block_copy_size(None).unwrap_or(4));
         let row_bytes = padded_row(texture.width(), pixel);
-        let buffer = ledger.buffer(
-            device,
-            Category::Readback,
-            &wgpu::BufferDescriptor {
-                label: Some("progressive-iso.capture"),
-                size: row_bytes * u64::from(texture.height()),
-                usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            },
-        );
+        let bytes = row_bytes * u64::from(texture.height());
+        let buffer = staging(device, ledger, bytes);
         encoder.copy_texture_to_buffer(
             texture.as_image_copy(),
             wgpu::TexelCopyBufferInfo {
@@ -150,6 +164,7 @@ impl Picture {
             },
             texture.size(),
         );
+        encoder.clear_buffer(&buffer, bytes, None);
         let state = Arc::new(AtomicU8::new(WAITING));
         let seen = Arc::clone(&state);
         encoder.map_buffer_on_submit(&buffer, wgpu::MapMode::Read, .., move |result| {
@@ -162,13 +177,18 @@ impl Picture {
     /// The rows without padding.
     fn pixels(&self, size: [u32; 2]) -> Option<Vec<u8>> {
         let view = self.buffer.get_mapped_range(..).ok()?;
+        let (rows, stamp) = view.split_at(view.len().checked_sub(STAMP_BYTES as usize)?);
+        if stamp == NOT_RUN.to_le_bytes() {
+            self.state.store(LOST, Ordering::Release);
+            return None;
+        }
         let pixel = match self.kind {
             Kind::Normal => 8,
             _ => 4,
         };
         let row = size[0] as usize * pixel;
         let mut bytes = Vec::with_capacity(row * size[1] as usize);
-        for padded in view.chunks_exact(self.row_bytes as usize) {
+        for padded in rows.chunks_exact(self.row_bytes as usize) {
             bytes.extend_from_slice(&padded[..row]);
         }
         Some(bytes)

@@ -65,7 +65,39 @@ pub enum Error {
         /// Rays that are not finished.
         active_rays: u32,
     },
-    /// The device was lost or failed while the caller waited.
+    /// The device is lost. Make a renderer on a new one; [`crate::ProgressiveIsoRenderer::volume`] still
+    /// has the stream. In browsers a lost device is seen as [`Error::MapFailed`].
+    #[error("the device is lost")]
+    DeviceLost,
+    /// The device has no memory for what the plan asks for. The renderer stays unusable.
+    #[error("the device is out of memory: {message}")]
+    OutOfMemory {
+        /// What wgpu says.
+        message: String,
+    },
+    /// The device refused a shader or a pipeline. The renderer stays unusable.
+    #[error("the device refused a shader: {message}")]
+    ShaderRefused {
+        /// What wgpu says.
+        message: String,
+    },
+    /// The device refused memory, bindings or commands: a fault of this library, or of a caller that
+    /// changed what belongs to it. The renderer stays unusable.
+    #[error("the device refused a pass: {message}")]
+    Refused {
+        /// What wgpu says.
+        message: String,
+    },
+    /// Results could not be mapped. The renderer stays unusable.
+    #[error("results could not be mapped")]
+    MapFailed,
+    /// A pass was submitted and did not run, or its shaders did not. The renderer stays unusable.
+    #[error("a submitted pass did not run")]
+    NotRun,
+    /// An encoder with a part of the volume was dropped. The renderer stays unusable.
+    #[error("an encoder that loads a part of the volume was dropped")]
+    LoadDropped,
+    /// Waiting for the device failed.
     #[error("waiting for the device failed: {0}")]
     Device(String),
     /// The compressed stream.

@@ -1,7 +1,10 @@
 #![doc = include_str!("../README.md")]
 
+#[cfg(not(target_arch = "wasm32"))]
+mod blocking;
 mod capture;
 mod error;
+mod faults;
 mod load;
 mod options;
 mod plan;
@@ -19,7 +22,7 @@ pub use capture::{Capture, PendingCapture};
 pub use error::Error;
 pub use gpu_primitives::memory::Category;
 pub use options::{Frame, FrameOptions, RendererOptions, Residency, TraversalStrategy};
-pub use plan::{Part, ScenePlan, When};
+pub use plan::{Part, ScenePlan, When, Work};
 pub use renderer::ProgressiveIsoRenderer;
 pub use report::PassReport;
 pub use volume::{CompressedVolume, StreamBytes};

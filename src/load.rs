@@ -21,6 +21,9 @@ const CHUNKS: u64 = 4;
 /// watchdog fires.
 const REGIONS_PER_PASS: u64 = 4;
 
+/// Blocks of a region, each decoded once, in dispatches of its own.
+pub(crate) const BLOCKS_PER_REGION: u64 = 33 * 33 * 33;
+
 /// How loading is split.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct LoadPlan {
@@ -42,13 +45,30 @@ impl LoadPlan {
     }
 }
 
+/// Pipelines of loading.
+#[derive(Debug)]
+pub(crate) struct LoadStages {
+    ranges: Ranges,
+    extrema: BlockExtrema,
+}
+
+impl LoadStages {
+    pub(crate) fn new(device: &wgpu::Device, plan: &ScenePlan) -> Result<Self, Error> {
+        let kept_pages = match &plan.samples {
+            SamplePlan::Cached(_) => 0,
+            SamplePlan::Resident(plan) => plan.page_count(),
+        };
+        let extrema = BlockExtrema::new(device, kept_pages)?;
+        Ok(Self { ranges: Ranges::new(device), extrema })
+    }
+}
+
 /// What loading needs; dropped when the GPU is done with it.
 #[derive(Debug)]
 pub(crate) struct Loader {
     upload: UploadRing,
     chunk: u64,
-    range_stage: Ranges,
-    extrema_stage: BlockExtrema,
+    stages: LoadStages,
     scratch: RangeScratch,
     extrema: ExtremaBuffers,
     /// Memory of the samples where all are kept.
@@ -63,6 +83,7 @@ impl Loader {
         ledger: &Ledger,
         plan: &ScenePlan,
         buffers: &VolumeBuffers,
+        stages: LoadStages,
     ) -> Result<Self, Error> {
         let VolumeBuffers { payload, ranges, .. } = buffers;
         let samples = match &plan.samples {
@@ -70,18 +91,14 @@ impl Loader {
             SamplePlan::Resident(plan) => Some(SampleBuffers::resident(device, ledger, plan)),
         };
         let kept = samples.as_ref().and_then(SampleBuffers::kept);
-        let kept_pages = kept.map_or(0, |kept| kept.pages.len() as u32);
-        let range_stage = Ranges::new(device);
-        let extrema_stage = BlockExtrema::new(device, kept_pages)?;
-        let scratch = RangeScratch::new(device, ledger, &range_stage, ranges);
+        let scratch = RangeScratch::new(device, ledger, &stages.ranges, ranges);
         let extrema =
-            ExtremaBuffers::new(device, ledger, &extrema_stage, payload, scratch.extrema(), kept)?;
+            ExtremaBuffers::new(device, ledger, &stages.extrema, payload, scratch.extrema(), kept)?;
         let chunk = plan.load.chunk;
         Ok(Self {
             upload: UploadRing::new(ledger, "progressive-iso.load.upload", chunk),
             chunk,
-            range_stage,
-            extrema_stage,
+            stages,
             scratch,
             extrema,
             samples,
@@ -136,7 +153,7 @@ impl Loader {
         let count = ranges.plan().region_count();
         for _ in 0..REGIONS_PER_PASS.min(count - self.next_region) {
             let region = ranges.plan().region(self.next_region);
-            self.extrema_stage.record(
+            self.stages.extrema.record(
                 device,
                 encoder,
                 params,
@@ -144,7 +161,7 @@ impl Loader {
                 region.block_origin(),
                 region.block_size(),
             )?;
-            self.range_stage.record(device, encoder, params, ranges, &self.scratch, region);
+            self.stages.ranges.record(device, encoder, params, ranges, &self.scratch, region);
             self.next_region += 1;
         }
         Ok(())

@@ -9,9 +9,10 @@ use macrocell::{MacrocellPlan, Masks, RangeScratch};
 use wavefront::{DrawBuffers, WavefrontPlan};
 use zfp_gpu::{DecodeBuffers, ExtremaBuffers, PayloadPlan, StreamLayout};
 
-use crate::load::LoadPlan;
+use crate::load::{BLOCKS_PER_REGION, LoadPlan};
 use crate::records::{CONTROL_BYTES, PASSES_IN_FLIGHT, READBACK_BYTES};
 use crate::samples::SamplePlan;
+use crate::schedule::FIRST_CELLS;
 use crate::strategy::StrategyPlan;
 use crate::{CompressedVolume, Error, RendererOptions, Residency, capture, wgpu};
 
@@ -47,6 +48,19 @@ pub struct Part {
     pub why: String,
     /// Whether the scene has it. What it does not have costs no byte, pipeline or dispatch.
     pub included: bool,
+}
+
+/// Most work of a dispatch, for any input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Work {
+    /// `RunAhead`: cells that all rays of a walk visit together, until times are known; from then on
+    /// [`crate::PassReport::cells_bound`].
+    pub first_cells: u32,
+    /// Blocks that a round decodes; 0 where all samples are resident.
+    pub blocks_decoded: u64,
+    /// Blocks that a dispatch decodes while loading.
+    pub blocks_loaded: u64,
 }
 
 /// What a scene needs, computed from the volume's layout, the options and the device's limits alone.
@@ -167,6 +181,16 @@ impl ScenePlan {
     #[must_use]
     pub fn blocks(&self) -> u64 {
         self.macrocell.grid().block_count()
+    }
+
+    /// Most work of a dispatch.
+    #[must_use]
+    pub fn work(&self) -> Work {
+        let blocks_decoded = match &self.samples {
+            SamplePlan::Cached(cache) => cache.job_capacity(),
+            SamplePlan::Resident(_) => 0,
+        };
+        Work { first_cells: FIRST_CELLS, blocks_decoded, blocks_loaded: BLOCKS_PER_REGION }
     }
 
     /// A table of the parts for people.

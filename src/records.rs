@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use gpu_primitives::memory::Ledger;
-use gpu_primitives::readback::ReadbackRing;
+use gpu_primitives::readback::{Lost, ReadbackRing};
 use wavefront::Statistics;
 use web_time::Instant;
 
@@ -52,6 +52,9 @@ pub(crate) struct PassInfo {
     /// Lists of active rays made before the first round.
     pub(crate) lists_at_start: u32,
     pub(crate) pixels: u32,
+    /// Cells that its walks may visit each, and the time that the pass should take.
+    pub(crate) most_cells: u32,
+    pub(crate) pass_ms: f32,
     pub(crate) dispatches: u32,
     /// When recording began.
     pub(crate) begin: Instant,
@@ -78,6 +81,10 @@ pub(crate) struct PassRecords {
     pub(crate) schedule: Schedule,
     last_report_at: Instant,
     pub(crate) report: PassReport,
+    lost: Option<Lost>,
+    /// The newest frame when an encoder was found to be dropped: what was recorded after it, up to that
+    /// frame, stands on a pass that did not run.
+    broken_frame: u64,
 }
 
 impl PassRecords {
@@ -92,7 +99,19 @@ impl PassRecords {
             schedule: Schedule::default(),
             last_report_at: Instant::now(),
             report: PassReport::default(),
+            lost: None,
+            broken_frame: 0,
         }
+    }
+
+    /// What became of a pass that cannot be made up for, if there was one.
+    pub(crate) fn lost(&self) -> Option<Lost> {
+        self.lost
+    }
+
+    /// Whether the newest frame must start again, because an encoder was dropped.
+    pub(crate) fn is_broken(&self) -> bool {
+        self.broken_frame > 0 && self.broken_frame == self.report.newest_frame
     }
 
     /// Whether another pass may be recorded.
@@ -148,33 +167,60 @@ impl PassRecords {
             let submitted = self.submitted[position];
             // Tags count on from the last one, so that one always stays.
             self.submitted.drain(..position);
-            let mut record = PassRecord::zeroed();
-            let length = submitted.record_bytes.min(bytes.len()).min(size_of::<PassRecord>());
-            bytemuck::bytes_of_mut(&mut record)[..length].copy_from_slice(&bytes[..length]);
-            #[cfg(feature = "wgpu-profiler")]
-            self.profile.take(&bytes[length..]);
-            if submitted.info.pass > 0 {
-                self.take(submitted.info, &record);
+            match bytes {
+                Ok(bytes) => self.take_bytes(&submitted, &bytes),
+                Err(Lost::Dropped) if submitted.info.pass > 0 => self.take_dropped(),
+                Err(lost) => self.lost = self.lost.or(Some(lost)),
             }
+        }
+    }
+
+    fn take_bytes(&mut self, submitted: &Submitted, bytes: &[u8]) {
+        let mut record = PassRecord::zeroed();
+        let length = submitted.record_bytes.min(bytes.len()).min(size_of::<PassRecord>());
+        bytemuck::bytes_of_mut(&mut record)[..length].copy_from_slice(&bytes[..length]);
+        #[cfg(feature = "wgpu-profiler")]
+        self.profile.take(&bytes[length..]);
+        let info = submitted.info;
+        if info.pass > 0 && record.rays.lists == 0 {
+            // The start of a frame lists its rays: no shader has run.
+            self.lost = self.lost.or(Some(Lost::NotRun));
+        } else if info.pass > 0 && info.frame > self.broken_frame {
+            self.take(info, &record);
+        }
+    }
+
+    /// After the frame is complete, a pass changes nothing.
+    fn take_dropped(&mut self) {
+        #[cfg(feature = "wgpu-profiler")]
+        self.profile.drop_oldest();
+        if !self.report.complete() {
+            self.broken_frame = self.report.newest_frame;
         }
     }
 
     /// Tells the schedule what a pass took that brought the frame to `rounds` rounds: by the GPU's clock
     /// or, without one, from its recording or the report before on.
-    fn take_time(&mut self, info: PassInfo, rounds: u32, gpu_ms: Option<f64>) {
+    fn take_time(&mut self, info: PassInfo, rounds: u32, cut: u32, gpu_ms: Option<f64>) {
         let now = Instant::now();
         let elapsed = now.duration_since(info.begin.max(self.last_report_at));
         self.last_report_at = now;
         let ms = gpu_ms.unwrap_or(1e3 * elapsed.as_secs_f64());
         let same_frame = self.report.frame == info.frame;
         let rounds_before = if same_frame { self.report.rounds } else { 0 };
-        self.schedule.take(rounds.saturating_sub(rounds_before), ms);
+        let cut_before = if same_frame { self.report.cut_walks } else { 0 };
+        let rounds = rounds.saturating_sub(rounds_before);
+        self.schedule.take(rounds, ms);
+        let in_force = info.most_cells == self.schedule.most_cells();
+        if rounds > 0 && cut != cut_before && in_force {
+            self.schedule.calibrate(ms / f64::from(rounds), info.pass_ms);
+        }
     }
 
     fn take(&mut self, info: PassInfo, record: &PassRecord) {
         let gpu_ms = self.timer.milliseconds(record.ticks);
         let rounds = record.rays.lists.saturating_sub(info.lists_at_start);
-        self.take_time(info, rounds, gpu_ms);
+        self.take_time(info, rounds, record.rays.cut, gpu_ms);
         let since = |now: u32, before: u32| now.wrapping_sub(before);
         let report = &mut self.report;
         report.frame = info.frame;
@@ -186,6 +232,9 @@ impl PassRecords {
         report.rays = info.pixels;
         report.entered_rays = record.rays.entered;
         report.active_rays = record.rays.active;
+        report.most_cells = record.rays.most_cells;
+        report.cells_bound = info.most_cells;
+        report.cut_walks = record.rays.cut;
         report.hits = record.rays.hits;
         report.open_depth_voxels = record.rays.open_depth_voxels();
         report.blocks_used = since(record.cache.used, record.cache_before.used);

@@ -7,7 +7,8 @@ use wavefront::{FrameView, LookAhead, OutputTextures, ShadingParams};
 use web_time::Instant;
 
 use crate::capture::PendingCapture;
-use crate::load::Loader;
+use crate::faults::{Faults, Scopes, Task, is_lost};
+use crate::load::{LoadStages, Loader};
 use crate::plan::PARAMS_CHUNK;
 use crate::records::{PassInfo, PassRecords};
 use crate::samples::SampleBuffers;
@@ -27,8 +28,15 @@ const WARM_MISSES: u32 = 3;
 ///
 /// The caller owns device and queue and decides when to submit. Nothing here blocks: counts come
 /// back some calls late. Dropping it frees all its memory.
+///
+/// # When the device fails
+/// What goes wrong with this library's own work goes through error scopes, not to the caller's handler of
+/// uncaptured errors, and comes back as a typed [`Error`] from this or a later call. The renderer then
+/// returns that error for ever and never reports a frame as complete that is not. Make another one, on a
+/// new device where the old one is lost, with `renderer.volume().clone()`, which shares the stream.
 #[derive(Debug)]
 pub struct ProgressiveIsoRenderer {
+    faults: Faults,
     volume: CompressedVolume,
     options: RendererOptions,
     plan: ScenePlan,
@@ -65,6 +73,10 @@ struct FrameState {
     /// Whether the pictures show nothing of earlier frames.
     cleared: bool,
     started: bool,
+    /// Whether its start forgets what is decoded.
+    clears_cache: bool,
+    /// Cells that a walk may visit.
+    most_cells: u32,
     passes: u32,
     rounds: u32,
 }
@@ -78,7 +90,7 @@ impl ProgressiveIsoRenderer {
     /// them.
     ///
     /// # Errors
-    /// As [`ScenePlan::new`].
+    /// As [`ScenePlan::new`], or if the device refuses a shader or has too little memory.
     pub fn new(
         device: &wgpu::Device,
         queue: &wgpu::Queue,
@@ -89,13 +101,19 @@ impl ProgressiveIsoRenderer {
         let limits = device.limits();
         let plan = ScenePlan::new(&volume, &options, &limits)?;
         let ledger = Ledger::new();
-        let stages = Stages::new(device, &plan, &options)?;
-        let buffers = VolumeBuffers::new(device, &ledger, &stages, &plan);
-        let pictures = Pictures::new(device, &ledger, &stages, &plan);
-        let loader = Loader::new(device, &ledger, &plan, &buffers)?;
+        let mut faults = Faults::default();
+        let (stages, load_stages) = faults.guard(device, Task::Pipelines, || {
+            Ok((Stages::new(device, &plan, &options)?, LoadStages::new(device, &plan)?))
+        })?;
         let upload = UploadRing::new(&ledger, "progressive-iso.upload", PARAMS_CHUNK);
-        let records = PassRecords::new(device, queue, &ledger);
+        let (buffers, pictures, loader, records) = faults.guard(device, Task::Other, || {
+            let buffers = VolumeBuffers::new(device, &ledger, &stages, &plan);
+            let pictures = Pictures::new(device, &ledger, &stages, &plan);
+            let loader = Loader::new(device, &ledger, &plan, &buffers, load_stages)?;
+            Ok((buffers, pictures, loader, PassRecords::new(device, queue, &ledger)))
+        })?;
         Ok(Self {
+            faults,
             volume,
             options,
             plan,
@@ -133,6 +151,8 @@ impl ProgressiveIsoRenderer {
             number: self.frame_count,
             cleared: false,
             started: false,
+            clears_cache: false,
+            most_cells: 0,
             passes: 0,
             rounds: 0,
         });
@@ -150,8 +170,19 @@ impl ProgressiveIsoRenderer {
     /// the volume, and once the frame is complete, nothing is recorded and `submitted` is false.
     ///
     /// # Errors
-    /// If no frame is set.
+    /// If no frame is set, or what went wrong with the device.
     pub fn render_pass(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+    ) -> Result<PassReport, Error> {
+        let scopes = Scopes::open(device, Task::Other);
+        let report = self.submit_pass(device, queue);
+        self.faults.close(scopes)?;
+        report
+    }
+
+    fn submit_pass(
         &mut self,
         device: &wgpu::Device,
         queue: &wgpu::Queue,
@@ -172,20 +203,70 @@ impl ProgressiveIsoRenderer {
 
     /// Like [`Self::render_pass`], into the caller's encoder, which the caller submits.
     ///
-    /// Submit encoders in the order in which they were recorded. After an encoder that is dropped
-    /// instead, set the frame again; a volume that was still loading must be made again.
+    /// Submit encoders in the order in which they were recorded, and none after an error. When one is
+    /// dropped instead, the current frame starts again, under a new number, unless it is complete; while
+    /// the volume is loading, that is an error.
     ///
     /// # Errors
-    /// If no frame is set.
+    /// If no frame is set, or what went wrong with the device. Errors of the caller's `finish` and
+    /// `submit` go to the caller; a pass that did not run because of them is an error of a later call.
     pub fn encode_pass(
         &mut self,
         device: &wgpu::Device,
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<PassReport, Error> {
-        self.records.collect();
+        self.check(device)?;
         if self.frame.is_none() {
             return Err(Error::NoFrame);
         }
+        let scopes = Scopes::open(device, Task::Other);
+        let report = self.record_pass(device, encoder);
+        self.faults.close(scopes)?;
+        report
+    }
+
+    /// Takes in what the GPU has finished.
+    fn collect(&mut self) {
+        // What a browser has not judged yet may be wrong.
+        if self.faults.check().is_ok() && self.faults.all_known() {
+            self.records.collect();
+        }
+        if self.records.is_broken() {
+            self.start_again();
+        }
+    }
+
+    /// [`Self::collect`], and what went wrong by then.
+    pub(crate) fn check(&mut self, device: &wgpu::Device) -> Result<(), Error> {
+        self.collect();
+        self.faults.check()?;
+        // A device that is lost says so in no other way than by what it does not do.
+        if is_lost(device) {
+            return self.faults.keep(Error::DeviceLost);
+        }
+        self.records.lost().map_or(Ok(()), |lost| self.faults.keep(lost.into()))
+    }
+
+    /// Starts the current frame again as if nothing had been recorded for it.
+    fn start_again(&mut self) {
+        self.active_isovalue = None;
+        if let Some(state) = &mut self.frame {
+            self.clear_cache |= state.clears_cache;
+            self.frame_count += 1;
+            state.number = self.frame_count;
+            state.started = false;
+            state.clears_cache = false;
+            state.passes = 0;
+            state.rounds = 0;
+            self.records.report.newest_frame = self.frame_count;
+        }
+    }
+
+    fn record_pass(
+        &mut self,
+        device: &wgpu::Device,
+        encoder: &mut wgpu::CommandEncoder,
+    ) -> Result<PassReport, Error> {
         if self.records.report.complete() || !self.records.has_room() || !self.advance(device)? {
             return Ok(self.report(false));
         }
@@ -282,6 +363,7 @@ impl ProgressiveIsoRenderer {
         let (stages, frame, upload) = (&self.stages, &state.frame, &mut self.upload);
         let isovalue = frame.isovalues[0];
         let clear = std::mem::take(&mut self.clear_cache);
+        state.clears_cache = clear;
         let warm = !clear && self.active_isovalue == Some(isovalue);
         rendering.samples.record_begin_frame(encoder, &stages.samples, clear);
         if self.active_isovalue != Some(isovalue) {
@@ -294,7 +376,9 @@ impl ProgressiveIsoRenderer {
             blocks: frame.options.look_ahead,
             first_misses: if warm { WARM_MISSES } else { 0 },
         };
-        let params = state.view.params(grid, lru, isovalue, look_ahead);
+        state.most_cells = self.records.schedule.most_cells();
+        let params =
+            state.view.params(grid, lru, isovalue, look_ahead).with_most_cells(state.most_cells);
         let shading = ShadingParams::new(&frame.options.shading, self.volume.world_from_index);
         rendering.record_start(device, encoder, upload, stages, &params, &shading);
         if let (Some(draw), Some(buffers)) = (&stages.draw, &self.pictures.draw) {
@@ -314,19 +398,29 @@ impl ProgressiveIsoRenderer {
             Phase::Rendering(rendering) => (rendering.counters(), rendering.lists_at_start()),
             _ => (Vec::new(), 0),
         };
-        let (frame, pass, rounds) = match &self.frame {
-            Some(state) if state.started => (state.number, state.passes, state.rounds),
-            _ => (0, 0, 0),
-        };
+        let state = self.frame.as_ref().filter(|state| state.started);
+        let (frame, pass, rounds) = state.map_or((0, 0, 0), |s| (s.number, s.passes, s.rounds));
+        let most_cells = state.map_or(0, |state| state.most_cells);
+        let pass_ms = state.map_or(0.0, |state| state.frame.options.pass_ms);
         let [width, height] = self.options.size;
         let cpu_ms = begin.elapsed().as_secs_f64() * 1e3;
         let pixels = width * height;
-        let info =
-            PassInfo { frame, pass, rounds, lists_at_start, pixels, dispatches, begin, cpu_ms };
+        let info = PassInfo {
+            frame,
+            pass,
+            rounds,
+            lists_at_start,
+            pixels,
+            most_cells,
+            pass_ms,
+            dispatches,
+            begin,
+            cpu_ms,
+        };
         self.records.record_readback(device, encoder, &counters, info);
     }
 
-    fn report(&self, submitted: bool) -> PassReport {
+    pub(crate) fn report(&self, submitted: bool) -> PassReport {
         PassReport {
             submitted,
             bytes: self.ledger.total(),
@@ -337,43 +431,8 @@ impl ProgressiveIsoRenderer {
 
     /// The newest report, after taking in what the GPU has finished. Records nothing.
     pub fn poll_report(&mut self) -> PassReport {
-        self.records.collect();
+        self.collect();
         self.report(false)
-    }
-
-    /// Renders passes until the frame is complete, blocking on the device: for offline use.
-    /// `each` sees every report; returning false stops early.
-    ///
-    /// # Errors
-    /// If no frame is set, the device fails, or passes stop making progress.
-    #[cfg(not(target_arch = "wasm32"))]
-    pub fn render_to_completion(
-        &mut self,
-        device: &wgpu::Device,
-        queue: &wgpu::Queue,
-        mut each: impl FnMut(&Self, &PassReport) -> bool,
-    ) -> Result<PassReport, Error> {
-        const PATIENCE: u32 = 256;
-        let mut idle_passes = 0;
-        let mut last = self.report(false);
-        loop {
-            self.render_pass(device, queue)?;
-            wait(device)?;
-            let report = self.poll_report();
-            let progressed = report.frame != last.frame
-                || report.active_rays != last.active_rays
-                || report.blocks_decoded != last.blocks_decoded
-                || report.pass == 0;
-            idle_passes = if progressed { 0 } else { idle_passes + 1 };
-            if !each(self, &report) || report.complete() {
-                return Ok(report);
-            }
-            if idle_passes >= PATIENCE {
-                let active_rays = report.active_rays;
-                return Err(Error::Stalled { passes: idle_passes, active_rays });
-            }
-            last = report;
-        }
     }
 
     /// Draws the surface pixels known so far into the caller's pass, with depth, so that they and
@@ -395,7 +454,7 @@ impl ProgressiveIsoRenderer {
     /// submits. One capture at a time is within the budget.
     ///
     /// # Errors
-    /// Without [`RendererOptions::capture`].
+    /// Without [`RendererOptions::capture`], or if the device has too little memory.
     pub fn capture(
         &self,
         device: &wgpu::Device,
@@ -404,30 +463,9 @@ impl ProgressiveIsoRenderer {
         if !self.options.capture {
             return Err(Error::CaptureNotPlanned);
         }
-        Ok(PendingCapture::record(device, &self.ledger, encoder, &self.pictures.textures))
-    }
-
-    /// Reads the pictures back, blocking on the device: for offline use.
-    ///
-    /// # Errors
-    /// Without [`RendererOptions::capture`], or if the device fails.
-    #[cfg(not(target_arch = "wasm32"))]
-    pub fn capture_blocking(
-        &self,
-        device: &wgpu::Device,
-        queue: &wgpu::Queue,
-    ) -> Result<crate::Capture, Error> {
-        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
-            label: Some("progressive-iso.capture"),
-        });
-        let mut pending = self.capture(device, &mut encoder)?;
-        #[expect(
-            clippy::disallowed_methods,
-            reason = "the facade submits on behalf of the caller"
-        )]
-        queue.submit([encoder.finish()]);
-        wait(device)?;
-        pending.try_take().ok_or_else(|| Error::Device("the pictures could not be mapped".into()))
+        Faults::default().guard(device, Task::Other, || {
+            Ok(PendingCapture::record(device, &self.ledger, encoder, &self.pictures.textures))
+        })
     }
 
     /// Forgets all decoded blocks when the next frame starts, as if the volume had just been loaded:
@@ -440,17 +478,23 @@ impl ProgressiveIsoRenderer {
     /// the budget still holds them all.
     ///
     /// # Errors
-    /// If the new size does not fit the limits or the budget; nothing changes then.
+    /// If the new size does not fit the limits or the budget; nothing changes then. Or what went wrong with
+    /// the device.
     pub fn resize(&mut self, device: &wgpu::Device, size: [u32; 2]) -> Result<(), Error> {
         let options = RendererOptions { size, ..self.options };
         let plan = self.replan(&options)?;
         let (layout, strategy) = (plan.samples.layout(), plan.strategy);
         if (layout, strategy) != (self.plan.samples.layout(), self.plan.strategy) {
-            self.stages = Stages::new(device, &plan, &options)?;
+            self.stages = self
+                .faults
+                .guard(device, Task::Pipelines, || Stages::new(device, &plan, &options))?;
         }
         // What goes does so before anything comes, or both together would exceed the budget.
         self.release_rays(plan.samples == self.plan.samples);
-        self.pictures.resize(device, &self.ledger, &self.stages, &plan);
+        self.faults.guard(device, Task::Other, || {
+            self.pictures.resize(device, &self.ledger, &self.stages, &plan);
+            Ok(())
+        })?;
         self.options = options;
         self.plan = plan;
         if let Some(state) = self.frame.take() {
@@ -520,11 +564,4 @@ impl ProgressiveIsoRenderer {
     pub fn volume(&self) -> &CompressedVolume {
         &self.volume
     }
-}
-
-#[cfg(not(target_arch = "wasm32"))]
-fn wait(device: &wgpu::Device) -> Result<(), Error> {
-    #[expect(clippy::disallowed_methods, reason = "offline use blocks by request")]
-    let result = device.poll(wgpu::PollType::wait_indefinitely());
-    result.map(|_| ()).map_err(|error| Error::Device(error.to_string()))
 }

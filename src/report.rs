@@ -45,6 +45,13 @@ pub struct PassReport {
     pub blocks_decoded: u32,
     /// Blocks evicted in this frame.
     pub blocks_evicted: u32,
+    /// `RunAhead`: most cells that all rays of a round visited together in this frame.
+    pub most_cells: u32,
+    /// Most that they may visit, so that no dispatch takes long: calibrated by the time of passes in which rays
+    /// were cut short, from frame to frame.
+    pub cells_bound: u32,
+    /// How often in this frame a ray was cut short by that bound and went on in the next round.
+    pub cut_walks: u32,
     /// `BlockSorted`: blocks that every ray went ahead in the pass's last round; 0 otherwise.
     pub speculation: u32,
     /// `BlockSorted`: ray-block pairs of the pass's last round; 0 otherwise.

@@ -1,11 +1,27 @@
 //! How many rounds a pass gets, so that no submission takes long.
 
+use wavefront::FrameParams;
+
 /// Rounds of a pass by measured time.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Schedule {
     /// Milliseconds that a round took lately; `None` before anything was measured.
     round_ms: Option<f64>,
+    /// Cells that a walk may visit; `None` before anything was measured.
+    most_cells: Option<u32>,
 }
+
+/// Cells of a walk before anything was measured: 64 for each of the 2 million rays that are walked at most, more
+/// than most views need. A GPU that visits less than a hundred million cells a second takes longer than a
+/// second for it; watchdogs wait for 2 s and more.
+pub(crate) const FIRST_CELLS: u32 = 1 << 27;
+
+/// Least cells of a walk: 32 for each of 2 million rays, with which a round of most views still ends.
+const LEAST_CELLS: u32 = 1 << 26;
+
+/// How much the bound may change by one measurement.
+const LEAST_FACTOR: f64 = 0.25;
+const MOST_FACTOR: f64 = 2.0;
 
 /// Part of an older estimate that stays: rounds with few rays left say little about the next frame.
 const MEMORY: f64 = 0.7;
@@ -22,6 +38,21 @@ impl Schedule {
         (fitting as u32).clamp(1, most)
     }
 
+    /// Cells that the walks of the next frame may visit each.
+    pub(crate) fn most_cells(&self) -> u32 {
+        self.most_cells.unwrap_or(FIRST_CELLS)
+    }
+
+    /// Takes in that rounds with the bound in force took `round_ms` each and rays were cut short by it: the
+    /// next frame's bound is what would take `pass_ms`.
+    pub(crate) fn calibrate(&mut self, round_ms: f64, pass_ms: f32) {
+        let factor = f64::from(pass_ms) / round_ms.max(1e-3);
+        if round_ms.is_finite() && !factor.is_nan() {
+            let cells = f64::from(self.most_cells()) * factor.clamp(LEAST_FACTOR, MOST_FACTOR);
+            self.most_cells = Some((cells as u32).clamp(LEAST_CELLS, FrameParams::MOST_CELLS));
+        }
+    }
+
     /// Takes in what a pass of `rounds` rounds took.
     pub(crate) fn take(&mut self, rounds: u32, ms: f64) {
         if rounds > 0 && ms.is_finite() {
@@ -35,6 +66,24 @@ impl Schedule {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_bound_of_a_walk_follows_the_time_it_takes() {
+        let mut schedule = Schedule::default();
+        assert_eq!(schedule.most_cells(), FIRST_CELLS);
+        schedule.calibrate(60.0, 30.0);
+        assert_eq!(schedule.most_cells(), FIRST_CELLS / 2);
+        schedule.calibrate(1e9, 30.0);
+        assert_eq!(schedule.most_cells(), LEAST_CELLS);
+        schedule.calibrate(f64::NAN, 30.0);
+        schedule.calibrate(1.0, f32::NAN);
+        schedule.calibrate(30.0, 30.0);
+        assert_eq!(schedule.most_cells(), LEAST_CELLS);
+        for _ in 0..40 {
+            schedule.calibrate(0.0, f32::INFINITY);
+        }
+        assert_eq!(schedule.most_cells(), FrameParams::MOST_CELLS);
+    }
 
     #[test]
     fn rounds_follow_the_time_they_take() {

@@ -132,8 +132,9 @@ impl Rendering {
             }
         };
         let read = samples.samples();
-        let rays = RayBuffers::new(device, ledger, &stages.rays, &plan.wavefront, read, textures);
-        let scene = Scene { rays: &rays, masks: volume.masks.buffer(), samples: read };
+        let (wavefront, masks) = (&plan.wavefront, volume.masks.buffer());
+        let rays = RayBuffers::new(device, ledger, &stages.rays, wavefront, masks, read, textures);
+        let scene = Scene { rays: &rays, masks, samples: read };
         let rounds = stages.strategy.bind(device, ledger, scene)?;
         Ok(Self { samples, rays, rounds })
     }

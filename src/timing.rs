@@ -126,6 +126,11 @@ impl Profile {
         }
     }
 
+    /// Forgets the oldest pass in flight: its ticks do not come.
+    pub(crate) fn drop_oldest(&mut self) {
+        self.recorded.pop_front();
+    }
+
     pub(crate) fn newest(&self) -> &[gpu_primitives::profile::StageTime] {
         &self.newest
     }

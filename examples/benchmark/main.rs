@@ -33,8 +33,7 @@ use std::path::PathBuf;
 use clap::Parser;
 use measure::Results;
 use scene::Scene;
-use support::origin::Origin;
-use support::{Failure, Gpu};
+use support::{Failure, Gpu, Origin};
 
 /// Measures both strategies on fixed views.
 #[derive(Parser)]
@@ -51,6 +50,9 @@ struct Arguments {
     /// Only volumes whose name contains this.
     #[arg(long)]
     volume: Option<String>,
+    /// Only settings whose name contains this, or one of these; not with the sets scaling and vtk.
+    #[arg(long)]
+    setting: Vec<String>,
     /// Measure nothing: write the volume of the set vtk, decoded, to this file as raw 32-bit floats,
     /// and beside it its stream (.zfp) and a view of it (.json).
     #[arg(long, value_name = "FILE")]
@@ -60,6 +62,14 @@ struct Arguments {
 impl Arguments {
     fn wants(&self, name: &str) -> bool {
         self.volume.as_ref().is_none_or(|part| name.contains(part.as_str()))
+    }
+
+    fn settings(&self, case: &sets::Case) -> Vec<sets::Setting> {
+        let mut settings = sets::settings(self.set, case);
+        if !self.setting.is_empty() {
+            settings.retain(|s| self.setting.iter().any(|part| s.label.contains(part.as_str())));
+        }
+        settings
     }
 }
 
@@ -105,7 +115,7 @@ fn strategies(arguments: &Arguments, gpu: &Gpu) -> Result<Results, Failure> {
             Some(scene) => scene,
             None => Scene::new(case.subject, true)?,
         };
-        measure::case(gpu, arguments.set, &case, &mut scene, &mut results)?;
+        measure::case(gpu, arguments.settings(&case), &case, &mut scene, &mut results)?;
         last = Some(scene);
     }
     Ok(results)

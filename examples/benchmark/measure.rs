@@ -15,7 +15,7 @@ use crate::library::{ROUNDS_OF_MOVED, Wanted, residency, with_residency};
 use crate::needed::Needed;
 use crate::scaling::Ratio;
 use crate::scene::{Scene, View};
-use crate::sets::{Case, STEP_DEGREES, Set, Setting, run_ahead, settings};
+use crate::sets::{Case, STEP_DEGREES, Setting, run_ahead};
 use crate::support::{Failure, Gpu, read_texture};
 
 /// Most bytes of all renderers that live at the same time.
@@ -46,17 +46,17 @@ pub fn options(setting: &Setting, size: [u32; 2], budget_bytes: u64) -> Renderer
     with_residency(options, setting.residency)
 }
 
-/// Measures all settings of a case. They take turns at every view, so that all of them see the same
+/// Measures a case with these settings. They take turns at every view, so that all of them see the same
 /// machine; where their memory together is too much, in groups.
 pub fn case(
     gpu: &Gpu,
-    set: Set,
+    settings: Vec<Setting>,
     case: &Case,
     scene: &mut Scene,
     results: &mut Results,
 ) -> Result<(), Failure> {
     let mut with_cpu = scene.decoded.is_some();
-    for group in groups(gpu, set, case, scene, results) {
+    for group in groups(gpu, settings, case, scene, results) {
         let mut renderers = Vec::new();
         for setting in group {
             renderers.push(Measured::new(gpu, scene, setting, case.size, case.budget_bytes)?);
@@ -70,13 +70,13 @@ pub fn case(
 /// The settings that can be measured, in groups whose memory is affordable.
 fn groups(
     gpu: &Gpu,
-    set: Set,
+    settings: Vec<Setting>,
     case: &Case,
     scene: &Scene,
     results: &mut Results,
 ) -> Vec<Vec<Setting>> {
     let (mut groups, mut bytes): (Vec<Vec<Setting>>, u64) = (Vec::new(), u64::MAX);
-    for setting in settings(set, case) {
+    for setting in settings {
         let options = options(&setting, case.size, case.budget_bytes);
         match planned_bytes(gpu, scene, &setting, &options) {
             Ok(planned) => {

@@ -9,8 +9,7 @@ use crate::measure::{Results, Skipped};
 use crate::rows::{Row, medians};
 use crate::scaling::Ratio;
 use crate::summary::Summary;
-use crate::support::origin::{Origin, write_json};
-use crate::support::{Failure, write_file};
+use crate::support::{Failure, Origin, write_file, write_json};
 use crate::{figures, tables};
 
 #[derive(Serialize)]

@@ -4,8 +4,18 @@ use crate::measure::{Results, Skipped};
 use crate::rows::Row;
 use crate::scaling::Ratio;
 use crate::summary::{Share, Summary};
-use crate::support::origin::Origin;
-use crate::support::table::{Table, number};
+use crate::support::{Origin, Table};
+
+/// A number without digits that mean nothing.
+pub fn number(value: f64) -> String {
+    if !value.is_finite() {
+        "".into()
+    } else if value.fract() == 0.0 || value.abs() >= 100.0 {
+        format!("{value:.0}")
+    } else {
+        format!("{value:.1}")
+    }
+}
 
 fn ratio(value: Option<f64>) -> String {
     value.map_or_else(String::new, |ratio| format!("{ratio:.2}"))

@@ -14,9 +14,10 @@ use crate::cpu_volume::CpuVolume;
 use crate::library::{self, Wanted, with_residency};
 use crate::scene::{FIELD_OF_VIEW_DEGREES, Scene, View};
 use crate::sets::{MIDDLE, default_look_ahead};
-use crate::support::origin::{Origin, write_json};
 use crate::support::subject::{Subject, cube, stream, turbulence};
-use crate::support::{Failure, Gpu, reset_resident_peak, resident_bytes, write_file};
+use crate::support::{
+    Failure, Gpu, Origin, reset_resident_peak, resident_bytes, write_file, write_json,
+};
 
 /// Repetitions, each with a new renderer.
 const REPEATS: usize = 5;

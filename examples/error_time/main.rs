@@ -26,8 +26,7 @@ use clap::Parser;
 use curve::Curve;
 use measure::Bench;
 use sets::{Case, Set};
-use support::Failure;
-use support::origin::Origin;
+use support::{Failure, Origin};
 use volume::Volume;
 
 /// Measures the error of the shown picture against the time.

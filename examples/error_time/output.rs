@@ -6,8 +6,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use crate::curve::Curve;
-use crate::support::origin::Origin;
-use crate::support::{Failure, write_file};
+use crate::support::{Failure, Origin, write_file};
 use crate::{figures, tables};
 
 /// Digits of numbers in the JSON.

@@ -5,8 +5,7 @@ use gpu_testkit::picture::PictureErrors;
 use crate::best::{GOALS, first_to_reach};
 use crate::curve::Curve;
 use crate::sets::Memory;
-use crate::support::origin::Origin;
-use crate::support::table::Table;
+use crate::support::{Origin, Table};
 
 pub fn all(origin: &Origin, curves: &[Curve]) -> String {
     let Origin { adapter, commit, date, command } = origin;

@@ -45,9 +45,15 @@ impl From<progressive_iso::Error> for Problem {
     fn from(error: progressive_iso::Error) -> Self {
         use progressive_iso::Error;
         match &error {
-            Error::Device(_) | Error::Stalled { .. } | Error::UnsupportedDevice { .. } => {
-                Self::trouble(&error)
-            }
+            Error::Device(_)
+            | Error::DeviceLost
+            | Error::OutOfMemory { .. }
+            | Error::ShaderRefused { .. }
+            | Error::Refused { .. }
+            | Error::MapFailed
+            | Error::NotRun
+            | Error::Stalled { .. }
+            | Error::UnsupportedDevice { .. } => Self::trouble(&error),
             Error::BudgetTooSmall { minimum, .. } => {
                 let least = minimum.div_ceil(1 << 20);
                 Self::input(&error).hint(format!("--budget {least} is the least for this scene"))

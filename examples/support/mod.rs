@@ -1,16 +1,19 @@
 //! What the examples share: a device, picture files, reports.
 
-#![allow(dead_code, unreachable_pub, reason = "every example uses a part of this")]
+#![allow(dead_code, unreachable_pub, unused_imports, reason = "every example uses a part of this")]
 
-pub mod origin;
+mod origin;
+mod table;
+
 pub mod plot;
 pub mod subject;
-pub mod table;
 
 use std::path::Path;
 
+pub use origin::Origin;
 use progressive_iso::{Capture, PassReport, ProgressiveIsoRenderer, wgpu};
 use serde::Serialize;
+pub use table::Table;
 
 pub type Failure = Box<dyn std::error::Error>;
 
@@ -292,6 +295,10 @@ impl Report {
 pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     std::fs::write(path, bytes)
         .map_err(|error| format!("cannot write {}: {error}", path.display()).into())
+}
+
+pub fn write_json(folder: &Path, name: &str, value: &impl Serialize) -> Result<(), Failure> {
+    write_file(&folder.join(name), serde_json::to_string_pretty(value)?.as_bytes())
 }
 
 pub fn write_png(path: &Path, capture: &Capture) -> Result<(), Failure> {

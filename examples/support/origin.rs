@@ -1,12 +1,9 @@
-//! Where, of what and when something was measured.
+//! Where, when and from which commit something was measured.
 
-use std::path::Path;
 use std::process::Command;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::Serialize;
-
-use super::{Failure, write_file};
 
 /// Where and when something was measured.
 #[derive(Clone, Debug, Serialize)]
@@ -23,10 +20,6 @@ impl Origin {
         let command = std::env::args().skip(1).collect::<Vec<_>>().join(" ");
         Self { adapter, commit: commit(), date: today(), command }
     }
-}
-
-pub fn write_json(folder: &Path, name: &str, value: &impl Serialize) -> Result<(), Failure> {
-    write_file(&folder.join(name), serde_json::to_string_pretty(value)?.as_bytes())
 }
 
 fn commit() -> String {

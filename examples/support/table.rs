@@ -26,14 +26,3 @@ impl Table {
         if self.empty { String::new() } else { self.text + "\n" }
     }
 }
-
-/// A number without digits that mean nothing.
-pub fn number(value: f64) -> String {
-    if !value.is_finite() {
-        "".into()
-    } else if value.fract() == 0.0 || value.abs() >= 100.0 {
-        format!("{value:.0}")
-    } else {
-        format!("{value:.1}")
-    }
-}

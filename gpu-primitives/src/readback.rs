@@ -6,14 +6,34 @@ use std::sync::atomic::{AtomicU8, Ordering};
 
 use crate::memory::{Buffer, Category, Ledger};
 
-/// Smallest size of a record: a mapping is never empty.
-const LEAST_BYTES: u64 = 4;
+/// Buffers are mapped and copied in multiples of this.
+const WORD_BYTES: u64 = 4;
+
+/// What a record ends with says that its submission ran: one of these in turn, so that what the record
+/// before left in the buffer is not taken for it, nor the zeros of a new buffer.
+const STAMPS: [u32; 2] = [1, 2];
+
+/// Why a record has no bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Lost {
+    /// Its encoder was dropped.
+    #[error("the encoder of a record was dropped")]
+    Dropped,
+    /// Its staging buffer could not be made or mapped, or the device is lost.
+    #[error("a staging buffer could not be mapped")]
+    NotMapped,
+    /// Its commands were submitted, or meant to be, and did not run: the device refused them.
+    #[error("a submission did not run")]
+    NotRun,
+}
 
 /// Copies parts of buffers into staging memory at a point of an encoder, and hands the bytes out
 /// once the submission is done and the caller has polled the device.
 ///
-/// Staging buffers are made when first needed, one per record in flight. A record whose encoder is
-/// dropped, or whose buffer cannot be mapped, is left out.
+/// Staging buffers are made when first needed, one per record in flight. The bytes are those that the
+/// GPU copied in this very submission, or the record is [`Lost`]: a submission that is refused can leave
+/// its staging buffer as it was and still have it mapped.
 #[derive(Debug)]
 pub struct ReadbackRing {
     ledger: Ledger,
@@ -21,22 +41,33 @@ pub struct ReadbackRing {
     bytes: u64,
     limit: usize,
     in_flight: VecDeque<Record>,
-    idle: Vec<Arc<Buffer>>,
+    idle: Vec<Staging>,
+    stamps: Option<Arc<Buffer>>,
 }
 
 #[derive(Debug)]
 struct Record {
     tag: u64,
     bytes: u64,
+    /// Which of the [`STAMPS`] the record ends with once it has run.
+    stamp: usize,
     slot: Arc<Slot>,
 }
 
+/// A buffer that no record uses.
+#[derive(Debug)]
+struct Staging {
+    buffer: Arc<Buffer>,
+    next_stamp: usize,
+}
+
 /// A staging buffer and what became of one mapping, shared with the callback that reports it: the
-/// buffer has to outlive the ring when an encoder still uses it, and a late callback must not touch
+/// buffers have to outlive the ring when an encoder still uses them, and a late callback must not touch
 /// the state of the buffer's next record.
 #[derive(Debug)]
 struct Slot {
     buffer: Arc<Buffer>,
+    _stamps: Arc<Buffer>,
     state: AtomicU8,
 }
 
@@ -44,7 +75,8 @@ struct Slot {
 mod state {
     pub(super) const RECORDED: u8 = 0;
     pub(super) const MAPPED: u8 = 1;
-    pub(super) const LOST: u8 = 2;
+    pub(super) const DROPPED: u8 = 2;
+    pub(super) const NOT_MAPPED: u8 = 3;
 }
 
 impl ReadbackRing {
@@ -54,17 +86,24 @@ impl ReadbackRing {
         Self {
             ledger: ledger.clone(),
             label: label.to_owned(),
-            bytes: bytes.next_multiple_of(LEAST_BYTES).max(LEAST_BYTES),
+            bytes: bytes.next_multiple_of(WORD_BYTES),
             limit: in_flight,
             in_flight: VecDeque::new(),
             idle: Vec::new(),
+            stamps: None,
         }
+    }
+
+    /// Bytes of a staging buffer: a record and its stamp.
+    fn staging_bytes(&self) -> u64 {
+        self.bytes.saturating_add(WORD_BYTES)
     }
 
     /// Most bytes that the ring allocates.
     #[must_use]
     pub fn bytes_limit(&self) -> u64 {
-        self.bytes.saturating_mul(self.limit as u64)
+        let stamps = size_of_val(&STAMPS) as u64;
+        self.staging_bytes().saturating_mul(self.limit as u64).saturating_add(stamps)
     }
 
     /// Records that were not taken yet.
@@ -100,62 +139,75 @@ impl ReadbackRing {
         if !self.has_room() {
             return false;
         }
-        let buffer = self.idle.pop().unwrap_or_else(|| Arc::new(self.staging(device)));
+        let Staging { buffer, next_stamp: stamp } = match self.idle.pop() {
+            Some(staging) => staging,
+            None => Staging { buffer: Arc::new(self.staging(device)), next_stamp: 0 },
+        };
         let mut at = 0;
         for &(source, offset, size) in parts.iter().filter(|part| part.2 > 0) {
             encoder.copy_buffer_to_buffer(source, offset, &buffer, at, size);
             at += size;
         }
-        let slot = Arc::new(Slot { buffer, state: AtomicU8::new(state::RECORDED) });
+        let stamps = || Arc::new(stamps(&self.ledger, device));
+        let stamps = Arc::clone(self.stamps.get_or_insert_with(stamps));
+        let from = stamp as u64 * WORD_BYTES;
+        encoder.copy_buffer_to_buffer(&stamps, from, &buffer, self.bytes, WORD_BYTES);
+        let state = AtomicU8::new(state::RECORDED);
+        let slot = Arc::new(Slot { buffer, _stamps: stamps, state });
         let handle = wgpu::Buffer::clone(&slot.buffer);
         let report = Report(Arc::clone(&slot));
         encoder.map_buffer_on_submit(&handle, wgpu::MapMode::Read, .., move |mapped| {
-            if mapped.is_ok() {
-                report.0.state.store(state::MAPPED, Ordering::Release);
-            }
+            let outcome = if mapped.is_ok() { state::MAPPED } else { state::NOT_MAPPED };
+            report.0.state.store(outcome, Ordering::Release);
         });
-        self.in_flight.push_back(Record { tag, bytes, slot });
+        self.in_flight.push_back(Record { tag, bytes, stamp, slot });
         true
     }
 
-    /// The tag and the bytes of the oldest record, if it is finished. Callers poll the device.
-    pub fn take(&mut self) -> Option<(u64, Vec<u8>)> {
-        loop {
-            match self.in_flight.front()?.slot.state.load(Ordering::Acquire) {
-                state::RECORDED => return None,
-                state::MAPPED => {
-                    let record = self.in_flight.pop_front()?;
-                    if let Some(bytes) = self.read(&record) {
-                        return Some((record.tag, bytes));
-                    }
-                }
-                _ => {
-                    // Its buffer goes with it: what became of the mapping is not known.
-                    let record = self.in_flight.pop_front()?;
-                    tracing::warn!(label = self.label, tag = record.tag, "record lost");
-                }
-            }
+    /// The tag and the bytes of the oldest record, if it is finished, or why there are none. Callers poll
+    /// the device.
+    ///
+    /// The buffer of a lost record goes with it.
+    pub fn take(&mut self) -> Option<(u64, Result<Vec<u8>, Lost>)> {
+        let state = self.in_flight.front()?.slot.state.load(Ordering::Acquire);
+        if state == state::RECORDED {
+            return None;
         }
+        let record = self.in_flight.pop_front()?;
+        let bytes = match state {
+            state::MAPPED => self.read(&record),
+            state::DROPPED => Err(Lost::Dropped),
+            _ => Err(Lost::NotMapped),
+        };
+        if let Err(lost) = bytes {
+            tracing::warn!(%lost, label = self.label, tag = record.tag);
+        }
+        Some((record.tag, bytes))
     }
 
-    fn read(&mut self, record: &Record) -> Option<Vec<u8>> {
+    fn read(&mut self, record: &Record) -> Result<Vec<u8>, Lost> {
         let buffer = &record.slot.buffer;
-        let bytes = match buffer.get_mapped_range(..) {
-            Ok(view) => view.iter().take(record.bytes as usize).copied().collect(),
+        let mapped = match buffer.get_mapped_range(..) {
+            Ok(view) => view.to_vec(),
             Err(error) => {
-                tracing::warn!(%error, label = self.label, tag = record.tag, "record lost");
-                return None;
+                tracing::warn!(%error, label = self.label, "no mapped range");
+                return Err(Lost::NotMapped);
             }
         };
         buffer.unmap();
-        self.idle.push(Arc::clone(buffer));
-        Some(bytes)
+        let (bytes, stamp) = mapped.split_at(self.bytes.min(mapped.len() as u64) as usize);
+        if stamp != STAMPS[record.stamp].to_le_bytes() {
+            return Err(Lost::NotRun);
+        }
+        let next_stamp = (record.stamp + 1) % STAMPS.len();
+        self.idle.push(Staging { buffer: Arc::clone(buffer), next_stamp });
+        Ok(bytes[..bytes.len().min(record.bytes as usize)].to_vec())
     }
 
     fn staging(&self, device: &wgpu::Device) -> Buffer {
         let desc = wgpu::BufferDescriptor {
             label: Some(&self.label),
-            size: self.bytes,
+            size: self.staging_bytes(),
             usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         };
@@ -163,13 +215,19 @@ impl ReadbackRing {
     }
 }
 
-/// Held by the callback; dropped uncalled or after a failure, it marks the record as lost.
+/// The [`STAMPS`] to copy from.
+fn stamps(ledger: &Ledger, device: &wgpu::Device) -> Buffer {
+    let (label, usage) = ("gpu-primitives.readback.stamps", wgpu::BufferUsages::COPY_SRC);
+    ledger.buffer_with(device, Category::Readback, label, usage, bytemuck::bytes_of(&STAMPS))
+}
+
+/// Held by the callback; dropped uncalled, it marks the record as dropped.
 struct Report(Arc<Slot>);
 
 impl Drop for Report {
     fn drop(&mut self) {
-        let lost = |state| (state == state::RECORDED).then_some(state::LOST);
-        // An error only says that the record is mapped.
-        self.0.state.fetch_update(Ordering::AcqRel, Ordering::Acquire, lost).ok();
+        let dropped = |state| (state == state::RECORDED).then_some(state::DROPPED);
+        // An error only says that the callback has been called.
+        self.0.state.fetch_update(Ordering::AcqRel, Ordering::Acquire, dropped).ok();
     }
 }

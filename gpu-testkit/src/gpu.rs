@@ -20,10 +20,11 @@ static ADAPTER: OnceLock<wgpu::Adapter> = OnceLock::new();
 /// When there is no adapter; later, on any error that no error scope catches.
 #[must_use]
 pub fn device() -> (wgpu::Device, wgpu::Queue) {
-    device_with(wgpu::Features::empty(), wgpu::Limits::default())
+    device_with(wgpu::Features::empty(), webgpu_limits())
 }
 
-/// A fresh device with exactly these features and limits, on the process-wide adapter.
+/// A fresh device with exactly these features and limits, those of them that are WebGPU's, on the
+/// process-wide adapter.
 ///
 /// # Panics
 /// When there is no adapter, or when it does not offer the features or limits; later, on any
@@ -33,6 +34,8 @@ pub fn device_with(
     required_features: wgpu::Features,
     required_limits: wgpu::Limits,
 ) -> (wgpu::Device, wgpu::Queue) {
+    let mut required_limits = required_limits;
+    required_limits.zero_native_only();
     let descriptor = wgpu::DeviceDescriptor {
         label: Some("gpu-testkit.device"),
         required_features,
@@ -43,7 +46,26 @@ pub fn device_with(
         Ok(pair) => pair,
         Err(error) => panic!("{} refused the device: {error}", adapter().get_info().name),
     };
+    panic_on_uncaptured(&device);
+    (device, queue)
+}
+
+fn panic_on_uncaptured(device: &wgpu::Device) {
     device.on_uncaptured_error(Arc::new(|error: wgpu::Error| panic!("uncaptured GPU {error}")));
+}
+
+/// A device that accepts everything, copies buffers and runs no shader.
+///
+/// # Panics
+/// On any error that no error scope catches.
+#[must_use]
+pub fn noop_device(required_limits: wgpu::Limits) -> (wgpu::Device, wgpu::Queue) {
+    let (device, queue) = wgpu::Device::noop(&wgpu::DeviceDescriptor {
+        label: Some("gpu-testkit.noop"),
+        required_limits,
+        ..Default::default()
+    });
+    panic_on_uncaptured(&device);
     (device, queue)
 }
 
@@ -95,14 +117,25 @@ fn adapters() -> Vec<wgpu::Adapter> {
     if found.is_empty() { adapters_of(wgpu::Backends::GL) } else { found }
 }
 
+/// Adapters of an instance that takes nothing that is not WebGPU.
 fn adapters_of(backends: wgpu::Backends) -> Vec<wgpu::Adapter> {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
+    descriptor.flags |= wgpu::InstanceFlags::STRICT_WEBGPU_COMPLIANCE;
     descriptor.backends &= backends;
     let instance = wgpu::Instance::new(descriptor);
     let mut found = pollster::block_on(instance.enumerate_adapters(backends));
-    found.retain(|adapter| wgpu::Limits::default().check_limits(&adapter.limits()));
+    found.retain(|adapter| webgpu_limits().check_limits(&adapter.limits()));
     found.sort_by_key(|adapter| type_rank(adapter.get_info().device_type));
     found
+}
+
+/// `wgpu::Limits::default()` without the one limit that is not WebGPU's: where wgpu is strict no adapter has it, and
+/// nothing is checked against it.
+#[must_use]
+pub fn webgpu_limits() -> wgpu::Limits {
+    let mut limits = wgpu::Limits::default();
+    limits.zero_native_only();
+    limits
 }
 
 fn type_rank(device_type: wgpu::DeviceType) -> u32 {
@@ -229,9 +262,23 @@ mod tests {
     #[test]
     fn the_device_offers_no_more_than_the_default_limits() {
         let (device, _queue) = device();
-        assert_eq!(device.limits(), wgpu::Limits::default());
+        assert_eq!(device.limits(), webgpu_limits());
         assert!(device.features().is_empty());
         assert!(!adapter_info().name.is_empty());
+    }
+
+    #[test]
+    fn only_what_webgpu_has_is_offered() {
+        let (device, _queue) = device();
+        assert!(!adapter().features().contains(wgpu::Features::MAPPABLE_PRIMARY_BUFFERS));
+        assert_eq!(device.limits().max_buffers_and_acceleration_structures_per_shader_stage, 0);
+    }
+
+    #[test]
+    fn a_noop_device_copies_and_runs_nothing() {
+        let (device, queue) = noop_device(wgpu::Limits::default());
+        let source = buffer_with(&device, &[1, 2, 3, 4], wgpu::BufferUsages::COPY_SRC);
+        assert_eq!(read_u32s(&device, &queue, &source), [0x0403_0201]);
     }
 
     #[test]

@@ -19,7 +19,7 @@ const LEADER_BLOCKS: u64 = 8;
 const MAX_SLOTS: u64 = 1 << 28;
 
 /// Requests served in one round at most.
-const MAX_REQUESTS: u64 = 1 << 16;
+const MAX_REQUESTS: u64 = 1 << 17;
 
 /// Bytes of the indirect arguments of the service's own dispatches.
 pub(crate) const CONTROL_BYTES: u64 = 48;
@@ -272,7 +272,7 @@ mod tests {
             let slots: u64 = slots.max(1);
             let of = |blocks| CachePlan { blocks, slots, slots_per_page: 1 << 19 };
             let plan = of(slots);
-            assert!(plan.bytes() <= (256 + 18) * slots + 2_500_000, "{slots} slots");
+            assert!(plan.bytes() <= (256 + 18) * slots + 4_500_000, "{slots} slots");
             assert_eq!(plan.bytes(), of(u64::from(u32::MAX)).bytes());
             let heads = plan.params().heads;
             assert!(heads.is_power_of_two());

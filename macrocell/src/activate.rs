@@ -6,6 +6,7 @@ use gpu_primitives::memory::{Buffer, Category, Ledger};
 use gpu_primitives::wgsl::{Module, compose_fixed};
 use gpu_primitives::{indirect, upload::UploadRing, wgpu};
 
+use crate::Grid;
 use crate::plan::CODE_BYTES;
 use crate::ranges::RangeBuffers;
 use crate::wgsl::QUANTISE;
@@ -14,6 +15,9 @@ const ACTIVATE: Module =
     Module { name: "activate", source: include_str!("../shader/activate.wgsl") };
 const THIRD_LEVEL: Module =
     Module { name: "third_level", source: include_str!("../shader/third_level.wgsl") };
+
+const ACTIVE_BOX: Module =
+    Module { name: "active_box", source: include_str!("../shader/active_box.wgsl") };
 
 /// Uniform of `shader/activate.wgsl`.
 #[repr(C)]
@@ -35,11 +39,42 @@ pub struct ThirdLevelParams {
     third_count: u32,
 }
 
+/// Uniform of `shader/active_box.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct ActiveBoxParams {
+    cells: [u32; 3],
+    first: u32,
+    last_cell: [i32; 3],
+    child_shift: u32,
+    active_box: u32,
+    has_third_level: u32,
+    pad0: u32,
+    pad1: u32,
+}
+
+impl ActiveBoxParams {
+    fn new(grid: Grid) -> Self {
+        let third = grid.has_third_level();
+        Self {
+            cells: if third { grid.third() } else { grid.coarse() },
+            first: if third { grid.coarse_count() as u32 } else { 0 },
+            last_cell: grid.last_cell(),
+            child_shift: if third { 2 } else { 0 },
+            active_box: grid.mask_count() as u32,
+            has_third_level: third.into(),
+            pad0: 0,
+            pad1: 0,
+        }
+    }
+}
+
 /// The stage that turns value ranges into active masks.
 #[derive(Debug)]
 pub struct Activate {
     activate: Kernel,
     third_level: Option<Kernel>,
+    active_box: Kernel,
 }
 
 /// Active masks of one volume.
@@ -48,6 +83,7 @@ pub struct Masks {
     masks: Buffer,
     pages: Vec<(Buffer, wgpu::BindGroup)>,
     third_level: Option<(Buffer, wgpu::BindGroup)>,
+    active_box: (Buffer, wgpu::BindGroup),
 }
 
 impl Masks {
@@ -104,10 +140,14 @@ impl Masks {
             let bind = kernel.bind(device, "macrocell.third_level", &resources);
             (params, bind)
         });
-        Self { masks, pages, third_level }
+        let params = params(bytemuck::bytes_of(&ActiveBoxParams::new(grid)));
+        let resources = [params.as_entire_binding(), masks.as_entire_binding()];
+        let bind = stage.active_box.bind(device, "macrocell.active_box", &resources);
+        Self { masks, pages, third_level, active_box: (params, bind) }
     }
 
-    /// The masks: two u32 per coarse cell, then two per third-level cell where there are any.
+    /// The masks: two u32 per coarse cell, then two per third-level cell where there are any, then eight of
+    /// the box of all active blocks: its first block, whether there is a third level, its last dual cell, 0.
     pub fn buffer(&self) -> &wgpu::Buffer {
         &self.masks
     }
@@ -115,7 +155,8 @@ impl Masks {
     /// Bytes of uniforms beside [`crate::MacrocellPlan::mask_bytes`].
     pub fn params_bytes(plan: &crate::MacrocellPlan) -> u64 {
         let third = if plan.grid().has_third_level() { size_of::<ThirdLevelParams>() } else { 0 };
-        plan.pages().count() as u64 * size_of::<ActivateParams>() as u64 + third as u64
+        let others = third + size_of::<ActiveBoxParams>();
+        plan.pages().count() as u64 * size_of::<ActivateParams>() as u64 + others as u64
     }
 }
 
@@ -126,6 +167,7 @@ impl Activate {
         Self {
             activate: Self::source().kernel(device),
             third_level: third_level.then(|| Self::third_level_source().kernel(device)),
+            active_box: Self::active_box_source().kernel(device),
         }
     }
 
@@ -157,6 +199,19 @@ impl Activate {
         }
     }
 
+    /// Text and bindings of the kernel that finds the box of all active blocks.
+    pub fn active_box_source() -> KernelSource {
+        KernelSource {
+            label: "macrocell.active_box",
+            wgsl: compose_fixed(ACTIVE_BOX, &[], &[]),
+            entry_point: "main",
+            bindings: vec![
+                Binding::Uniform { bytes: size_of::<ActiveBoxParams>() as u64 },
+                Binding::StorageReadWrite { min_bytes: 8 },
+            ],
+        }
+    }
+
     /// Records computing the masks for `isovalue` (finite).
     pub fn record(
         &self,
@@ -180,6 +235,7 @@ impl Activate {
         if let (Some(kernel), Some((_, bind))) = (&self.third_level, &masks.third_level) {
             kernel.dispatch(&mut pass, bind, plan.grid().third_count().div_ceil(64));
         }
+        self.active_box.dispatch(&mut pass, &masks.active_box.1, 1);
     }
 }
 
@@ -202,5 +258,12 @@ mod tests {
         check_struct(&text, "ThirdLevelParams", &params).unwrap();
         let bytes = struct_size(&text, "ThirdLevelParams").unwrap();
         assert_eq!(bytes as usize, size_of::<ThirdLevelParams>());
+        let text = Activate::active_box_source().wgsl.source;
+        let params = members!(
+            ActiveBoxParams: cells, first, last_cell, child_shift, active_box, has_third_level, pad0, pad1
+        );
+        check_struct(&text, "ActiveBoxParams", &params).unwrap();
+        let bytes = struct_size(&text, "ActiveBoxParams").unwrap();
+        assert_eq!(bytes as usize, size_of::<ActiveBoxParams>());
     }
 }

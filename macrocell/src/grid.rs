@@ -16,6 +16,12 @@ fn linear(position: [u32; 3], size: [u32; 3]) -> u64 {
             * (u64::from(position[1]) + u64::from(size[1]) * u64::from(position[2]))
 }
 
+/// The position whose linear index is `index`.
+pub(crate) fn position(index: u64, size: [u32; 3]) -> [u32; 3] {
+    let [x, y, _] = size.map(u64::from);
+    [index % x, index / x % y, index / (x * y)].map(|p| p as u32)
+}
+
 fn volume(size: [u32; 3]) -> u64 {
     size.iter().map(|&s| u64::from(s)).product()
 }
@@ -63,8 +69,7 @@ impl Grid {
 
     /// Position of the coarse cell with a linear index.
     pub fn coarse_position(&self, index: u64) -> [u32; 3] {
-        let [x, y, _] = self.coarse().map(u64::from);
-        [(index % x) as u32, (index / x % y) as u32, (index / (x * y)) as u32]
+        position(index, self.coarse())
     }
 
     /// Third-level cells on each axis.
@@ -82,9 +87,20 @@ impl Grid {
         linear(third, self.third())
     }
 
+    /// Position of the third-level cell with a linear index.
+    pub fn third_position(&self, index: u64) -> [u32; 3] {
+        position(index, self.third())
+    }
+
     /// Whether the volume is large enough for the third level to pay.
     pub fn has_third_level(&self) -> bool {
         self.coarse_count() >= THIRD_LEVEL_FROM
+    }
+
+    /// Masks of all levels.
+    pub fn mask_count(&self) -> u64 {
+        let third = if self.has_third_level() { self.third_count() } else { 0 };
+        self.coarse_count() + third
     }
 
     /// Bits of a block's x, of its x and y, and of its whole position when the three coordinates are packed

@@ -14,6 +14,9 @@ const EXTREMA_BYTES: u64 = 64;
 /// Bytes of a coarse cell's range codes.
 pub(crate) const CODE_BYTES: u64 = 128;
 
+/// Bytes of the box of the active blocks.
+const ACTIVE_BOX_BYTES: u64 = 32;
+
 /// Most bits of a block's packed position, so that two are left for a ray's status.
 const MOST_BITS: u32 = 30;
 
@@ -89,15 +92,9 @@ impl MacrocellPlan {
         self.grid.coarse_count() * (CODE_BYTES + 8)
     }
 
-    /// Bytes of the active masks.
+    /// Bytes of the active masks and of the box behind them.
     pub fn mask_bytes(&self) -> u64 {
-        self.mask_count() * 8
-    }
-
-    /// Masks of all levels.
-    pub fn mask_count(&self) -> u64 {
-        let third = if self.grid.has_third_level() { self.grid.third_count() } else { 0 };
-        self.grid.coarse_count() + third
+        self.grid.mask_count() * 8 + ACTIVE_BOX_BYTES
     }
 
     /// Coarse cells of the largest region.
@@ -122,8 +119,7 @@ impl MacrocellPlan {
 
     /// The region with number `index`, x fastest.
     pub fn region(&self, index: u64) -> Region {
-        let [nx, ny, _] = self.region_grid().map(u64::from);
-        let position = [index % nx, index / nx % ny, index / (nx * ny)].map(|p| p as u32);
+        let position = crate::grid::position(index, self.region_grid());
         let (coarse, size) = (self.grid.coarse(), self.region_coarse());
         let coarse_origin: [u32; 3] = std::array::from_fn(|a| position[a] * size[a]);
         let coarse_size = std::array::from_fn(|a| size[a].min(coarse[a] - coarse_origin[a]));
@@ -161,7 +157,7 @@ mod tests {
         assert_eq!(blocks, 125_829_120);
         assert_eq!(plan.range_bytes(), 2 * blocks + blocks / 8);
         assert_eq!(plan.pages().count(), 2);
-        assert_eq!(plan.mask_bytes(), blocks / 8 + blocks / 512);
+        assert_eq!(plan.mask_bytes(), blocks / 8 + blocks / 512 + 32);
     }
 
     #[test]

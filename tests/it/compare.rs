@@ -1,10 +1,10 @@
 //! Comparison of a picture with the f64 reference renderer on the decoded samples: hit mask,
 //! parameter, normal, colour and background of every pixel.
 
-use gpu_testkit::reference::{self, Ray, Trace};
+use gpu_testkit::bounds::{RayErrors, Sight, U};
+use gpu_testkit::judge::{Answer, Judge, Truth};
 use progressive_iso::{Camera, Capture, FrameView, PixelStatus, Shading};
 
-use crate::bounds::{Around, RayErrors, U, parameter_error, reach};
 use crate::support::{BACKGROUND, Scene, shading};
 
 /// Rounding of one component of a unit vector to f16, in either direction.
@@ -54,16 +54,13 @@ impl Summary {
 
 /// One view of a scene with the reference's answers.
 pub(crate) struct Expected<'a> {
-    scene: reference::Scene<'a>,
+    judge: Judge<'a>,
     samples: &'a [f32],
     dims: [u32; 3],
-    isovalue: f64,
     world_from_index: [[f64; 4]; 4],
     size: [u32; 2],
-    view: FrameView,
     shading: Shading,
-    rays: Vec<Ray>,
-    traces: Vec<Trace>,
+    pixels: Vec<(Sight, Truth)>,
 }
 
 /// One pixel of a picture.
@@ -78,38 +75,32 @@ struct Pixel {
 impl<'a> Expected<'a> {
     pub(crate) fn new(scene: &Scene, samples: &'a [f32], camera: &Camera, size: [u32; 2]) -> Self {
         let dims = scene.volume.dims;
-        let isovalue = f64::from(scene.isovalue);
-        let reference = reference::Scene::new(dims, samples, isovalue);
+        let judge = Judge::new(dims, samples, f64::from(scene.isovalue));
         let view = FrameView::new(camera, size, scene.world_from_index, dims).unwrap();
+        let errors = RayErrors::new(size, view.start_depth(), |pixel| view.ray(pixel));
         let pixels = (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| [x, y]));
-        let rays: Vec<Ray> = pixels
-            .map(|pixel| {
-                let (origin, direction, _) = view.ray(pixel);
-                Ray { origin, direction, t_min: 0.0 }
-            })
-            .collect();
-        let traces = reference.trace_rays(&rays);
+        let sights: Vec<Sight> = pixels.map(|pixel| errors.sight(pixel, view.ray(pixel))).collect();
+        let rays: Vec<_> = sights.iter().map(|sight| sight.ray).collect();
+        let traces = judge.scene().trace_rays(&rays);
+        let with_truth = |(sight, trace)| (sight, judge.truth(&sight, trace));
+        let pixels = sights.into_iter().zip(traces).map(with_truth).collect();
         Self {
-            scene: reference,
+            judge,
             samples,
             dims,
-            isovalue,
             world_from_index: scene.world_from_index,
             size,
-            view,
             shading: shading(),
-            rays,
-            traces,
+            pixels,
         }
     }
 
     /// Compares every pixel.
     pub(crate) fn check(&self, picture: &Capture) -> Result<Summary, String> {
-        let errors = RayErrors::new(&self.view, self.size);
         let mut summary = Summary::default();
-        for index in 0..self.rays.len() {
+        for index in 0..self.pixels.len() {
             let pixel = [index as u32 % self.size[0], index as u32 / self.size[0]];
-            self.check_pixel(&errors, pixel, &pixel_of(picture, index), &mut summary)
+            self.check_pixel(index, &pixel_of(picture, index), &mut summary)
                 .map_err(|problem| format!("pixel {pixel:?}: {problem}"))?;
         }
         Ok(summary)
@@ -117,118 +108,58 @@ impl<'a> Expected<'a> {
 
     fn check_pixel(
         &self,
-        errors: &RayErrors,
-        pixel: [u32; 2],
+        index: usize,
         found: &Pixel,
         summary: &mut Summary,
     ) -> Result<(), String> {
-        let index = (pixel[0] + self.size[0] * pixel[1]) as usize;
-        let (ray, trace) = (&self.rays[index], &self.traces[index]);
-        let error = errors.of(&self.view, pixel);
-        let (_, _, depth_per_voxel) = self.view.ray(pixel);
+        let (sight, truth) = &self.pixels[index];
+        let depth = match found.status {
+            PixelStatus::Background => None,
+            PixelStatus::Hit => Some(found.depth),
+            PixelStatus::Unfinished => return Err("unfinished".into()),
+        };
         summary.rays += 1;
-        // The true first hit, and the parameters at which f32 may find it.
-        let truth = trace.hit.map(|hit| {
-            let around = self.around(hit.position);
-            let allowed = around.value_error(error.position(hit.t));
-            let slack = parameter_error(&self.view, depth_per_voxel, hit.t);
-            let side = |sign| reach(&self.scene, ray, hit.t, sign, allowed);
-            (hit.t, slack, allowed, [side(-1.0), side(1.0)])
-        });
-        let diagonal = self.dims.map(f64::from).iter().map(|n| n * n).sum::<f64>().sqrt();
-        let farthest = error.position(2.0 * diagonal);
-        let grazes_box =
-            trace.silhouette_distance.abs() <= farthest.into_iter().fold(0.0, f64::max);
-        let may_miss = grazes_box || truth.is_some_and(|t| trace.turning_margin <= t.2);
-        summary.ambiguous += usize::from(may_miss);
-        match found.status {
-            PixelStatus::Background => {
-                check_empty(found)?;
-                match truth {
-                    None => Ok(()),
-                    Some(_) if may_miss => {
-                        summary.excused += 1;
-                        Ok(())
-                    }
-                    Some((t, ..)) => Err(format!("no hit, expected one at t = {t}: {trace:?}")),
-                }
-            }
-            PixelStatus::Hit => {
-                summary.hits += 1;
-                let t = (f64::from(found.depth) - self.view.start_depth()) / depth_per_voxel;
-                let slack = parameter_error(&self.view, depth_per_voxel, t.max(0.0));
-                if !(t >= -slack && t.is_finite()) {
-                    return Err(format!("a hit at t = {t}, before the ray's start"));
-                }
-                let position_error = error.position(t);
-                self.check_residual(ray, t, slack, position_error, summary)?;
-                match truth {
-                    // The residual says that the field touches the isovalue here.
-                    None => summary.excused += 1,
-                    Some((t0, slack, _, reaches)) => {
-                        let reach = reaches[usize::from(t > t0)];
-                        let bound = slack + reach.unwrap_or(0.0);
-                        let off = (t - t0).abs();
-                        if off <= bound {
-                            summary.worst_t = summary.worst_t.max(off / bound);
-                            summary.worst_voxels = summary.worst_voxels.max(off);
-                        } else if t < t0 || may_miss || reach.is_none() {
-                            summary.excused += 1;
-                        } else {
-                            return Err(format!("a hit at t = {t}, expected at {t0}: {trace:?}"));
-                        }
-                    }
-                }
-                let tolerance =
-                    [0, 1, 2].map(|a| position_error[a] + slack * ray.direction[a].abs());
-                self.check_shading(ray, t, tolerance, found, summary)
-            }
-            PixelStatus::Unfinished => Err("unfinished".into()),
+        summary.ambiguous += usize::from(truth.may_miss);
+        let verdict = self.judge.verdict(sight, truth, depth);
+        if verdict.answer.is_wrong() {
+            return Err(format!("{:?}: {:?}", verdict.answer, truth.trace));
         }
-    }
-
-    fn around(&self, position: [f64; 3]) -> Around {
-        Around::new(self.dims, self.samples, self.isovalue, position)
-    }
-
-    /// The true field at a hit is the isovalue, up to rounding.
-    fn check_residual(
-        &self,
-        ray: &Ray,
-        t: f64,
-        slack: f64,
-        position_error: [f64; 3],
-        summary: &mut Summary,
-    ) -> Result<(), String> {
-        let around = self.around(ray.at(t));
-        let along: f64 = (0..3).map(|a| around.steps[a] * ray.direction[a].abs()).sum();
-        let bound = around.value_error(position_error) + along * slack;
-        let residual = self.scene.value(ray.at(t)).abs();
-        summary.worst_residual = summary.worst_residual.max(residual / bound);
-        if residual <= bound {
-            Ok(())
-        } else {
-            Err(format!("a hit at t = {t}, where the field is off by {residual:e} > {bound:e}"))
+        summary.excused += usize::from(verdict.answer == Answer::Tie);
+        if let Some(measured) = verdict.parameter {
+            summary.worst_t = summary.worst_t.max(measured.share());
+            summary.worst_voxels = summary.worst_voxels.max(measured.found);
+        }
+        if let Some(measured) = verdict.residual {
+            summary.worst_residual = summary.worst_residual.max(measured.share());
+        }
+        match verdict.t {
+            None => check_empty(found),
+            Some(t) => {
+                summary.hits += 1;
+                self.check_shading(sight, t, found, summary)
+            }
         }
     }
 
     /// Normal and colour follow from the gradient of a cell that holds the hit.
     fn check_shading(
         &self,
-        ray: &Ray,
+        sight: &Sight,
         t: f64,
-        tolerance: [f64; 3],
         found: &Pixel,
         summary: &mut Summary,
     ) -> Result<(), String> {
+        let ray = &sight.ray;
         let position = ray.at(t);
+        let (moved, slack) = (sight.error.position(t), sight.parameter_error(t.max(0.0)));
+        let tolerance = [0, 1, 2].map(|a| moved[a] + slack * ray.direction[a].abs());
         let columns = self.world_from_index;
         let along =
             [0, 1, 2].map(|r| (0..3).map(|c| columns[c][r] * ray.direction[c]).sum::<f64>());
         let to_viewer = normalized(along).map(|v| v.map(|x| -x)).unwrap_or([0.0, 0.0, 1.0]);
         let mut best: Option<(f64, f64, f64, String)> = None;
         for cell in self.cells(position, tolerance) {
-            let gradient = self.scene.gradient(cell, position);
+            let gradient = self.judge.scene().gradient(cell, position);
             let world = transform_normal(&columns, gradient);
             let error = self.gradient_error(cell, tolerance);
             let error = length(transform_normal_size(&columns, error));

@@ -5,11 +5,12 @@
 #![allow(clippy::unwrap_used, reason = "a failed set-up fails the test")]
 #![allow(clippy::print_stdout, reason = "measured numbers, shown with --nocapture")]
 
-mod bounds;
 mod budget;
 mod compare;
+mod counters;
 mod draw;
 mod errors;
+mod faults;
 mod invariance;
 mod left_out;
 mod memory;
@@ -17,4 +18,8 @@ mod open_depth;
 mod published;
 mod reference;
 mod residency;
+mod stability;
+#[path = "../../examples/stability/suite/mod.rs"]
+mod suite;
 mod support;
+mod work;

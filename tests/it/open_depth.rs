@@ -1,12 +1,11 @@
 //! `PassReport::open_depth_voxels`: the first hits of unfinished rays lie where the report says.
 
-use gpu_testkit::reference::Ray;
+use gpu_testkit::bounds::{RayErrors, Sight};
 use progressive_iso::{
     Capture, Frame, FrameView, PassReport, PixelStatus, RendererOptions, TraversalStrategy,
 };
 use proptest::prelude::*;
 
-use crate::bounds::{RayError, RayErrors, parameter_error};
 use crate::invariance::{minimum_budget, strategies};
 use crate::support::{Gpu, Scene, options};
 
@@ -55,7 +54,7 @@ struct Way {
 }
 
 impl Way {
-    fn new(ray: &Ray, error: &RayError, dims: [u32; 3]) -> Self {
+    fn new(Sight { ray, error, .. }: &Sight, dims: [u32; 3]) -> Self {
         let mut way = Self { begin: 0.0, end: [f64::INFINITY; 2] };
         for axis in (0..3).filter(|&axis| ray.direction[axis] != 0.0) {
             let planes = [0.0, f64::from(dims[axis]) - 1.0];
@@ -74,22 +73,21 @@ impl Way {
 fn check(scene: &Scene, frame: &Frame, shot: &Interrupted, open: f64) -> Result<usize, String> {
     let (dims, size) = (scene.volume.dims, shot.partial.size);
     let view = FrameView::new(&frame.camera, size, scene.world_from_index, dims).unwrap();
-    let errors = RayErrors::new(&view, size);
+    let errors = RayErrors::new(size, view.start_depth(), |pixel| view.ray(pixel));
     let (mut hits, mut longest): (usize, f64) = (0, 0.0);
     for (i, status) in shot.partial.status.iter().flatten().enumerate() {
         if *status != PixelStatus::Unfinished {
             continue;
         }
         let pixel = [i as u32 % size[0], i as u32 / size[0]];
-        let (origin, direction, depth_per_voxel) = view.ray(pixel);
-        let ray = Ray { origin, direction, t_min: 0.0 };
-        let way = Way::new(&ray, &errors.of(&view, pixel), dims);
+        let sight = errors.sight(pixel, view.ray(pixel));
+        let way = Way::new(&sight, dims);
         longest = longest.max(way.end[1] - way.begin);
-        let depth = f64::from(shot.finished.depth.as_ref().unwrap()[i]);
+        let depth = shot.finished.depth.as_ref().unwrap()[i];
         if depth.is_finite() {
             hits += 1;
-            let t = (depth - view.start_depth()) / depth_per_voxel;
-            let before_end = way.end[0] - t - parameter_error(&view, depth_per_voxel, t);
+            let t = sight.parameter(depth);
+            let before_end = way.end[0] - t - sight.parameter_error(t);
             if before_end > open {
                 return Err(format!(
                     "pixel {pixel:?}: a hit {before_end} voxels before the end, {open} claimed"

@@ -35,12 +35,13 @@ fn bytes_of(renderer: &ProgressiveIsoRenderer, category: Category) -> u64 {
 #[test]
 fn both_residencies_make_the_same_picture() {
     let gpu = Gpu::new();
-    for (name, dims, rate) in [
-        ("gyroid", [37, 26, 31], 9.0),
-        ("turbulence", [70, 65, 33], 4.0),
-        ("rough-solid", [40, 41, 43], 6.0),
-        ("sphere", [2, 3, 2], 16.0),
-        ("plane", [5, 1, 4], 16.0),
+    // The last two have no active block, so no ray is ever active.
+    for (name, dims, rate, rounds) in [
+        ("gyroid", [37, 26, 31], 9.0, 1),
+        ("turbulence", [70, 65, 33], 4.0, 1),
+        ("rough-solid", [40, 41, 43], 6.0, 1),
+        ("sphere", [2, 3, 2], 16.0, 0),
+        ("plane", [5, 1, 4], 16.0, 0),
     ] {
         let scene = Scene::generated(name, dims, rate);
         for azimuth in [15.0, 200.0] {
@@ -55,8 +56,6 @@ fn both_residencies_make_the_same_picture() {
             let again = gpu.finish(&mut renderer, &frame);
             same_picture(&again, &cached).unwrap();
             let report = renderer.poll_report();
-            // None where the volume has no cell.
-            let rounds = u32::from(dims.iter().all(|&n| n > 1));
             assert_eq!((report.pass, report.rounds), (1, rounds), "{name}");
         }
     }

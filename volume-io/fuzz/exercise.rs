@@ -49,3 +49,63 @@ pub fn with_layout(bytes: &[u8], raw: bool) -> Option<(ReadOptions, &[u8])> {
     }
     Some((options, rest))
 }
+
+/// Something that takes any bytes.
+pub type Target = fn(&[u8]);
+
+/// Every target, in the order of their names; a file of `fuzz_targets` each.
+pub const TARGETS: [(&str, Target); 8] = [
+    ("gzip", gzip),
+    ("mrc", mrc),
+    ("nifti", nifti),
+    ("npy", npy),
+    ("nrrd", nrrd),
+    ("raw", raw),
+    ("vti", vti),
+    ("zfp", zfp),
+];
+
+/// Anything in a gzip file.
+pub fn gzip(bytes: &[u8]) {
+    exercise_magic("fuzz.gz", bytes, 0, b"\x1f\x8b\x08");
+}
+
+/// MRC maps.
+pub fn mrc(bytes: &[u8]) {
+    exercise_magic("fuzz.mrc", bytes, 208, b"MAP ");
+}
+
+/// NIfTI-1 in one file.
+pub fn nifti(bytes: &[u8]) {
+    exercise_magic("fuzz.nii", bytes, 344, b"n+1\0");
+}
+
+/// NumPy arrays.
+pub fn npy(bytes: &[u8]) {
+    exercise_magic("fuzz.npy", bytes, 0, b"\x93NUMPY");
+}
+
+/// NRRD with an attached header.
+pub fn nrrd(bytes: &[u8]) {
+    exercise_magic("fuzz.nrrd", bytes, 0, b"NRRD000");
+}
+
+/// Samples with a layout from the input.
+pub fn raw(bytes: &[u8]) {
+    if let Some((options, rest)) = with_layout(bytes, true) {
+        exercise("fuzz.raw", rest, &options);
+    }
+}
+
+/// VTK images.
+pub fn vti(bytes: &[u8]) {
+    exercise_magic("fuzz.vti", bytes, 0, b"<VTKFile");
+}
+
+/// Streams with zfp's header, and headerless ones.
+pub fn zfp(bytes: &[u8]) {
+    exercise_magic("fuzz.zfp", bytes, 0, b"zfp\x05");
+    if let Some((options, rest)) = with_layout(bytes, false) {
+        exercise("fuzz.zfp", rest, &options);
+    }
+}

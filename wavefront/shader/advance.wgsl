@@ -47,9 +47,9 @@ fn main(
     let ray = frame_ray(frame, frame_pixel(frame, id)).ray;
     let block = frame_unpack(frame, rays[RAYS_HEADER + id]);
 #ifdef EMPTY_SPACE_STEP
-    rays[RAYS_HEADER + id] = advance(frame_grid(frame, id), ray, block, 0u, 0u);
+    rays[RAYS_HEADER + id] = advance(macrocell_active(frame.grid), ray, block, 0u, 0u);
 #else
     let count = pairs[PAIRS_SPECULATION];
-    rays[RAYS_HEADER + id] = advance(frame_grid(frame, id), ray, block, index * count, count);
+    rays[RAYS_HEADER + id] = advance(macrocell_active(frame.grid), ray, block, index * count, count);
 #endif
 }

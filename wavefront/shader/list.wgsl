@@ -35,6 +35,7 @@ fn write_args(active_count: u32) {
     atomicStore(&rays[RAYS_ACTIVE], active_count);
     atomicStore(&rays[RAYS_LISTED], listed);
     atomicAdd(&rays[RAYS_LISTS], 1u);
+    atomicMax(&rays[RAYS_MOST_CELLS], atomicExchange(&rays[RAYS_CELLS], 0u));
     // Rays that this round's list had no room for have not been looked at: their whole way is open.
     let across = length(vec3<f32>(frame.grid.last_cell + vec3<i32>(1)));
     let unlisted = select(0u, bitcast<u32>(across), was_active > frame.list_capacity);

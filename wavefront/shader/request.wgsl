@@ -85,5 +85,5 @@ fn main(
     let state = rays[RAYS_HEADER + id];
     let least = frame.look_ahead + frame_zero(id);
     let count = look_ahead(frame_count(frame, state), least);
-    request_ahead(frame_grid(frame, id), ray, frame_unpack(frame, state), count, index == 0u);
+    request_ahead(macrocell_active(frame.grid), ray, frame_unpack(frame, state), count, index == 0u);
 }

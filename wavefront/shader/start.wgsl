@@ -1,12 +1,14 @@
-// Starts a frame: every ray's first block, a bit for those that enter the volume, cleared outputs.
+// Starts a frame: every ray's first block, a bit for those that may hit something, cleared outputs.
 #import frame
 #import indirect
+#import macrocell_skip
 #import outputs
 
 @group(0) @binding(0) var<uniform> frame: FrameParams;
 @group(0) @binding(1) var<uniform> shading: ShadingParams;
 @group(0) @binding(2) var<storage, read_write> rays: array<atomic<u32>>;
-@group(0) @binding(3) var color_out: texture_storage_2d<rgba8unorm, write>;
+@group(0) @binding(3) var<storage, read> masks: array<vec2<u32>>;
+@group(0) @binding(4) var color_out: texture_storage_2d<rgba8unorm, write>;
 #ifdef OUTPUT_DEPTH
 @group(0) @binding(DEPTH_BINDING) var depth_out: texture_storage_2d<r32float, write>;
 #endif
@@ -17,15 +19,21 @@
 @group(0) @binding(STATUS_BINDING) var status_out: texture_storage_2d<r32uint, write>;
 #endif
 
-var<workgroup> entered_bits: array<atomic<u32>, 2>;
+var<workgroup> active_bits: array<atomic<u32>, 2>;
+var<workgroup> entered: atomic<u32>;
 
-// The ray's first state: waiting in the block where it enters the volume, or done.
-fn first_state(grid: MacrocellGrid, ray: DdaRay) -> u32 {
-    let volume = DdaBox(vec3<i32>(0), grid.last_cell);
-    if (any(grid.last_cell < vec3<i32>(0)) || !dda_meets(ray, volume)) {
-        return RAY_DONE;
-    }
-    let cell = dda_cell_after(ray, dda_entry(ray, volume), volume, dda_first_cells(ray, volume));
+fn macrocell_mask(index: u32) -> vec2<u32> {
+    return masks[index];
+}
+
+// Whether the ray has a part inside the box, which may be empty.
+fn meets(ray: DdaRay, box: DdaBox) -> bool {
+    return all(box.low <= box.high) && dda_meets(ray, box);
+}
+
+// The state of a ray that waits in the block where it enters `box`.
+fn waiting(ray: DdaRay, box: DdaBox) -> u32 {
+    let cell = dda_cell_after(ray, dda_entry(ray, box), box, dda_first_cells(ray, box));
     return RAY_ACTIVE | frame_pack_count(frame, frame.first_misses) | frame_pack(frame, cell >> vec3<u32>(2u));
 }
 
@@ -36,26 +44,37 @@ fn main(
     @builtin(local_invocation_index) lane: u32,
 ) {
     if (lane < 2u) {
-        atomicStore(&entered_bits[lane], 0u);
+        atomicStore(&active_bits[lane], 0u);
+    }
+    if (lane == 0u) {
+        atomicStore(&entered, 0u);
     }
     workgroupBarrier();
     let id = indirect_linear_group(group, groups) * 64u + lane;
     let pixel = frame_pixel(frame, id);
     if (id < frame.ray_numbers && pixel.x < frame.width && pixel.y < frame.height) {
-        let grid = frame_grid(frame, atomicLoad(&rays[RAYS_HITS]));
-        let state = first_state(grid, frame_ray(frame, pixel).ray);
-        let entered = state != RAY_DONE;
-        atomicStore(&rays[RAYS_HEADER + id], state);
-        outputs_write_empty(pixel, entered);
-        if (entered) {
-            atomicOr(&entered_bits[lane >> 5u], 1u << (lane & 31u));
+        let ray = frame_ray(frame, pixel).ray;
+        let zero = i32(frame_zero(atomicLoad(&rays[RAYS_HITS])));
+        let volume = DdaBox(vec3<i32>(0), frame.grid.last_cell + vec3<i32>(zero));
+        let grid = macrocell_active(frame.grid);
+        let box = DdaBox(4 * grid.first_block, grid.last_cell);
+        if (meets(ray, volume)) {
+            atomicAdd(&entered, 1u);
         }
+        var state = RAY_DONE;
+        if (meets(ray, box)) {
+            state = waiting(ray, box);
+            atomicOr(&active_bits[lane >> 5u], 1u << (lane & 31u));
+        }
+        atomicStore(&rays[RAYS_HEADER + id], state);
+        outputs_write_empty(pixel, state != RAY_DONE);
     }
     workgroupBarrier();
     if ((lane & 31u) == 0u && id < frame.ray_numbers) {
-        let bits = atomicLoad(&entered_bits[lane >> 5u]);
-        atomicStore(&rays[frame_active_word(frame, id)], bits);
-        atomicAdd(&rays[RAYS_ENTERED], countOneBits(bits));
+        atomicStore(&rays[frame_active_word(frame, id)], atomicLoad(&active_bits[lane >> 5u]));
+    }
+    if (lane == 0u) {
+        atomicAdd(&rays[RAYS_ENTERED], atomicLoad(&entered));
     }
     if (id == 0u) {
         atomicStore(&rays[RAYS_ACTIVE], 1u); // the first list is to be made

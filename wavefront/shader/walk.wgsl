@@ -7,9 +7,10 @@
 #import lru_lookup
 #import block_samples
 #import block_walk
+#import work
 
 @group(0) @binding(0) var<uniform> frame: FrameParams;
-@group(0) @binding(1) var<storage, read_write> rays: array<u32>;
+@group(0) @binding(1) var<storage, read_write> rays: array<atomic<u32>>;
 @group(0) @binding(2) var<storage, read> masks: array<vec2<u32>>;
 @group(0) @binding(3) var<storage, read> lru_directory: array<u32>;
 @group(0) @binding(4) var<storage, read_write> lru_state: array<atomic<u32>>;
@@ -45,10 +46,15 @@ fn walk(grid: MacrocellGrid, ray: DdaRay, state: u32) -> u32 {
     let first = frame_unpack(frame, state);
     var place = macrocell_advance(grid, ray, macrocell_enter(grid, ray, first));
     while (macrocell_inside(grid, place.block)) {
+        if (work_is_done()) {
+            let misses = frame_pack_count(frame, frame_count(frame, state));
+            return RAY_ACTIVE | misses | frame_pack(frame, place.block);
+        }
         block_open(place.block);
         let box = macrocell_box(grid, place.block);
         let start = CellPlace(place.event, macrocell_first_cell(grid, ray, place));
         let result = block_walk(ray, start, box, frame.isovalue, 0u);
+        work_cells += result.cells + u32(result.hit);
         if (result.hit) {
             return RAY_HIT | frame_pack_count(frame, result.cells) | frame_pack(frame, place.block);
         }
@@ -70,12 +76,15 @@ fn main(
     @builtin(local_invocation_index) lane: u32,
 ) {
     let index = indirect_linear_group(group, groups) * 64u + lane;
-    if (index >= rays[RAYS_LISTED]) {
+    let listed = atomicLoad(&rays[RAYS_LISTED]);
+    if (index >= listed) {
         return;
     }
     lru_begin_keeping();
-    let id = rays[frame_list_word(frame, index)];
+    let id = atomicLoad(&rays[frame_list_word(frame, index)]);
     let ray = frame_ray(frame, frame_pixel(frame, id)).ray;
-    let state = rays[RAYS_HEADER + id];
-    rays[RAYS_HEADER + id] = walk(frame_grid(frame, id), ray, state);
+    let state = atomicLoad(&rays[RAYS_HEADER + id]);
+    work_begin(listed);
+    atomicStore(&rays[RAYS_HEADER + id], walk(macrocell_active(frame.grid), ray, state));
+    work_count();
 }

@@ -18,8 +18,10 @@ pub struct GridParams {
     pub(crate) coarse: [u32; 3],
     pub(crate) has_third_level: u32,
     pub(crate) third: [u32; 3],
-    pub(crate) pad0: u32,
+    pub(crate) active_box: u32,
     pub(crate) last_cell: [i32; 3],
+    pub(crate) pad0: u32,
+    pub(crate) first_block: [i32; 3],
     pub(crate) pad1: u32,
 }
 
@@ -32,8 +34,10 @@ impl GridParams {
             coarse: grid.coarse(),
             has_third_level: grid.has_third_level().into(),
             third: grid.third(),
-            pad0: 0,
+            active_box: grid.mask_count() as u32,
             last_cell: grid.last_cell(),
+            pad0: 0,
+            first_block: [0; 3],
             pad1: 0,
         }
     }
@@ -62,9 +66,21 @@ pub struct FrameParams {
     pub(crate) shift_y: u32,
     pub(crate) shift_z: u32,
     pub(crate) shift_misses: u32,
-    pub(crate) pad0: u32,
+    pub(crate) most_cells: u32,
     pub(crate) grid: GridParams,
     pub(crate) lru: LruParams,
+}
+
+impl FrameParams {
+    /// Most that a bound on the cells of a walk may be: so a count of cells stays far below 2^32.
+    pub const MOST_CELLS: u32 = 1 << 31;
+
+    /// Cells that one walk of all listed rays visits at most, [`Self::MOST_CELLS`] if nothing else is said. A
+    /// ray visits one block at least in a round, so less than 10 per listed ray count as 10.
+    #[must_use]
+    pub fn with_most_cells(self, most_cells: u32) -> Self {
+        Self { most_cells: most_cells.min(Self::MOST_CELLS), ..self }
+    }
 }
 
 /// How many blocks stopped rays of `RunAhead` request.
@@ -179,7 +195,7 @@ impl FrameView {
             shift_y,
             shift_z,
             shift_misses,
-            pad0: 0,
+            most_cells: FrameParams::MOST_CELLS,
             grid: GridParams::new(grid),
             lru,
         }

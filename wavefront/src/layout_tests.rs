@@ -48,7 +48,7 @@ fn frame_uniforms_have_the_declared_layout() {
         shift_y,
         shift_z,
         shift_misses,
-        pad0,
+        most_cells,
         grid,
         lru,
     });
@@ -59,8 +59,10 @@ fn frame_uniforms_have_the_declared_layout() {
         coarse,
         has_third_level,
         third,
-        pad0,
+        active_box,
         last_cell,
+        pad0,
+        first_block,
         pad1,
     });
     check_struct(&source, "MacrocellGrid", &grid).unwrap();

@@ -18,6 +18,7 @@ const FRAME: Module = Module { name: "frame", source: include_str!("../shader/li
 const CELL: Module = Module { name: "cell", source: include_str!("../shader/lib/cell.wgsl") };
 const BLOCK_WALK: Module =
     Module { name: "block_walk", source: include_str!("../shader/lib/block_walk.wgsl") };
+const WORK: Module = Module { name: "work", source: include_str!("../shader/lib/work.wgsl") };
 const LIST: Module = Module { name: "list", source: include_str!("../shader/list.wgsl") };
 const BLOCK_NEED: Module =
     Module { name: "block_need", source: include_str!("../shader/lib/block_need.wgsl") };
@@ -55,11 +56,18 @@ pub struct Counters {
     /// Lists of active rays made so far: one by every round that had any, and those of
     /// [`crate::Rounds::lists_at_start`].
     pub lists: u32,
+    /// Cells that the walk since the last list visited; 0 after a round.
+    pub cells: u32,
+    /// `RunAhead`: most cells that the rays of a walk visited together.
+    pub most_cells: u32,
+    /// `RunAhead`: how often a ray stopped because all together had visited
+    /// [`FrameParams::with_most_cells`].
+    pub cut: u32,
     /// Scratch of the round that is going on.
     open_now: u32,
     /// Bits of [`Counters::open_depth_voxels`].
     open: u32,
-    pad: u32,
+    pad: [u32; 2],
 }
 
 impl Counters {
@@ -89,6 +97,7 @@ pub(crate) fn library(samples: SampleLayout) -> Vec<Module> {
         CELL,
         BLOCK_NEED,
         BLOCK_WALK,
+        WORK,
         samples.module(),
         OUTPUTS,
         indirect::MODULE,
@@ -132,7 +141,7 @@ impl Rays {
     /// Texts and bindings of the kernels.
     pub fn sources(outputs: Outputs, samples: SampleLayout) -> [KernelSource; 4] {
         let shading = Binding::Uniform { bytes: size_of::<ShadingParams>() as u64 };
-        let start = vec![FRAME_PARAMS, shading, RAYS];
+        let start = vec![FRAME_PARAMS, shading, RAYS, MASKS];
         let mut resolve = vec![FRAME_PARAMS, shading, RAYS];
         resolve.extend(samples.bindings());
         let list = vec![FRAME_PARAMS, RAYS, WRITE, WRITE];
@@ -201,12 +210,14 @@ pub struct RayBuffers {
 }
 
 impl RayBuffers {
-    /// Allocates the state of one picture. `textures` have the plan's outputs and size.
+    /// Allocates the state of one picture. `masks` are the active masks, as `macrocell` makes them;
+    /// `textures` have the plan's outputs and size.
     pub fn new(
         device: &wgpu::Device,
         ledger: &Ledger,
         stage: &Rays,
         plan: &WavefrontPlan,
+        masks: &wgpu::Buffer,
         samples: Samples<'_>,
         textures: &OutputTextures,
     ) -> Self {
@@ -230,7 +241,7 @@ impl RayBuffers {
         let fill_args = args("wavefront.list.fill_args", FILL_ARGS_BYTES);
         let args = args("wavefront.args", ARGS_BYTES);
         let views = || textures.views().iter().map(wgpu::BindingResource::TextureView);
-        let mut start = resources(&[&frame, &shading, &rays]);
+        let mut start = resources(&[&frame, &shading, &rays, masks]);
         start.extend(views());
         let mut resolve = resources(&[&frame, &shading, &rays]);
         resolve.extend(samples.resources());

@@ -1,6 +1,6 @@
 use crate::{encoder, own_device, words};
 use gpu_primitives::memory::{Category, Ledger};
-use gpu_primitives::readback::ReadbackRing;
+use gpu_primitives::readback::{Lost, ReadbackRing};
 use gpu_testkit::gpu;
 
 fn bytes(words: &[u32]) -> Vec<u8> {
@@ -17,7 +17,7 @@ fn parts_follow_each_other() {
     assert!(ring.record(device, &mut encoder, &parts, 77));
     assert_eq!(ring.take(), None, "not submitted");
     gpu::submit_and_wait(device, queue, encoder);
-    assert_eq!(ring.take(), Some((77, bytes(&[2, 3, 6, 1]))));
+    assert_eq!(ring.take(), Some((77, Ok(bytes(&[2, 3, 6, 1])))));
     assert_eq!(ring.take(), None);
 }
 
@@ -34,7 +34,7 @@ fn records_come_in_order_of_recording() {
     assert_eq!(ring.take(), None, "the oldest record is not submitted");
     gpu::submit_and_wait(device, queue, late);
     let taken: Vec<_> = std::iter::from_fn(|| ring.take()).collect();
-    assert_eq!(taken, [(0, bytes(&[10])), (1, bytes(&[11])), (2, bytes(&[12]))]);
+    assert_eq!(taken, [(0, Ok(bytes(&[10]))), (1, Ok(bytes(&[11]))), (2, Ok(bytes(&[12])))]);
 }
 
 #[test]
@@ -42,7 +42,7 @@ fn a_full_ring_records_nothing() {
     let (device, queue) = &own_device();
     let ledger = Ledger::new();
     let mut ring = ReadbackRing::new(&ledger, "test", 4, 2);
-    assert_eq!(ring.bytes_limit(), 8);
+    assert_eq!(ring.bytes_limit(), 24, "two records and their stamps");
     let source = words(device, &[1]);
     for round in 0..4u64 {
         let mut encoder = encoder(device);
@@ -53,10 +53,10 @@ fn a_full_ring_records_nothing() {
         assert!(!ring.record(device, &mut encoder, &[(&source, 0, 4)], 99));
         gpu::submit_and_wait(device, queue, encoder);
         assert!(!ring.has_room(), "only take makes room");
-        assert_eq!(ring.take(), Some((2 * round, bytes(&[1]))));
-        assert_eq!(ring.take(), Some((2 * round + 1, bytes(&[1]))));
+        assert_eq!(ring.take(), Some((2 * round, Ok(bytes(&[1])))));
+        assert_eq!(ring.take(), Some((2 * round + 1, Ok(bytes(&[1])))));
         assert_eq!(ring.take(), None);
-        assert_eq!(ledger.by_category(), [(Category::Readback, 8)], "buffers are used again");
+        assert_eq!(ledger.by_category(), [(Category::Readback, 24)], "buffers are used again");
     }
 }
 
@@ -83,8 +83,65 @@ fn a_dropped_encoder_loses_only_its_record() {
     assert!(ring.record(device, &mut kept, &[(&source, 4, 4)], 1));
     drop(dropped);
     gpu::submit_and_wait(device, queue, kept);
-    assert_eq!(ring.take(), Some((1, bytes(&[2]))));
-    assert_eq!(ring.in_flight(), 0);
+    assert_eq!(ring.take(), Some((0, Err(Lost::Dropped))));
+    assert_eq!(ring.take(), Some((1, Ok(bytes(&[2])))));
+    assert_eq!((ring.take(), ring.in_flight()), (None, 0));
+}
+
+/// wgpu refuses the submission and maps the buffer all the same: with zeros, or with what the record
+/// before left in it.
+#[test]
+fn a_refused_submission_gives_no_bytes() {
+    let (device, queue) = &own_device();
+    for earlier_records in 0..3 {
+        let mut ring = ReadbackRing::new(&Ledger::new(), "test", 4, 1);
+        let source = words(device, &[1]);
+        for tag in 0..earlier_records {
+            let mut encoder = encoder(device);
+            assert!(ring.record(device, &mut encoder, &[(&source, 0, 4)], tag));
+            gpu::submit_and_wait(device, queue, encoder);
+            assert_eq!(ring.take(), Some((tag, Ok(bytes(&[1])))));
+        }
+        let mut encoder = encoder(device);
+        assert!(ring.record(device, &mut encoder, &[(&source, 0, 4)], 9));
+        source.destroy();
+        let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
+        gpu::submit_and_wait(device, queue, encoder);
+        assert!(pollster::block_on(scope.pop()).is_some());
+        assert_eq!(ring.take(), Some((9, Err(Lost::NotRun))));
+    }
+}
+
+#[test]
+fn a_staging_buffer_that_cannot_be_made_gives_no_bytes() {
+    let (device, queue) = &own_device();
+    let mut ring = ReadbackRing::new(&Ledger::new(), "test", device.limits().max_buffer_size, 1);
+    let source = words(device, &[1]);
+    let mut encoder = encoder(device);
+    let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
+    assert!(ring.record(device, &mut encoder, &[(&source, 0, 4)], 0));
+    gpu::submit_and_wait(device, queue, encoder);
+    assert!(pollster::block_on(scope.pop()).is_some());
+    assert_eq!(ring.take(), Some((0, Err(Lost::NotMapped))));
+}
+
+#[test]
+fn a_lost_device_gives_no_bytes() {
+    let (device, queue) = &own_device();
+    let mut ring = ReadbackRing::new(&Ledger::new(), "test", 4, 2);
+    let source = words(device, &[1]);
+    // What is made on a lost device is invalid.
+    let _scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
+    for (tag, lose) in [(0, true), (1, false)] {
+        let mut encoder = encoder(device);
+        assert!(ring.record(device, &mut encoder, &[(&source, 0, 4)], tag));
+        if lose {
+            device.destroy();
+        }
+        gpu::submit_and_wait(device, queue, encoder);
+    }
+    assert_eq!(ring.take(), Some((0, Err(Lost::NotMapped))));
+    assert_eq!(ring.take(), Some((1, Err(Lost::NotMapped))));
 }
 
 #[test]

@@ -169,15 +169,15 @@ fn a_full_table_holds_every_block_once() {
 
 #[test]
 fn more_requests_than_one_round_serves() {
-    let (blocks, slots) = (400_000, 70_001);
+    let (blocks, slots) = (800_000, 140_001);
     let mut cache = Parallel::new(blocks, slots);
-    assert_eq!(cache.capacity, 1 << 16);
-    for (first, served) in [(0, 1 << 16), (0, (1 << 16) + 4465), (200_000, 70_001)] {
-        let ops = (first..first + 150_000).map(Op::Use).collect();
+    assert_eq!(cache.capacity, 1 << 17);
+    for (first, served) in [(0, 1 << 17), (0, (1 << 17) + 8929), (400_000, 140_001)] {
+        let ops = (first..first + 300_000).map(Op::Use).collect();
         cache.round(&Round { ops, ..Round::default() });
         assert_eq!(cache.words.next_free(), served);
     }
-    assert_eq!(cache.words.counters().evicted, 1 << 16);
+    assert_eq!(cache.words.counters().evicted, 1 << 17);
     cache.check_lookups();
 }
 

@@ -7,8 +7,10 @@ struct MacrocellGrid {
     coarse: vec3<u32>,
     has_third_level: u32,
     third: vec3<u32>,
+    active_box: u32,        // where the active box follows the masks
+    last_cell: vec3<i32>,   // dims - 2, or that of the active box
     pad0: u32,
-    last_cell: vec3<i32>, // dims - 2
+    first_block: vec3<i32>, // 0, or that of the active box
     pad1: u32,
 }
 
@@ -23,10 +25,9 @@ fn macrocell_linear(position: vec3<i32>, size: vec3<u32>) -> u32 {
     return u32(position.x) + size.x * (u32(position.y) + size.y * u32(position.z));
 }
 
-// Whether the block has dual cells. What lies outside the volume has none.
+// Whether the block has dual cells of the grid.
 fn macrocell_inside(grid: MacrocellGrid, block: vec3<i32>) -> bool {
-    // As unsigned numbers, negative ones are large.
-    return all(vec3<u32>(block) * 4u <= vec3<u32>(grid.last_cell)) && all(block >= vec3<i32>(0));
+    return all(block * 4 <= grid.last_cell) && all(block >= grid.first_block);
 }
 
 // The block's dual cells.

@@ -2,6 +2,17 @@
 // The importing text supplies fn macrocell_mask(index: u32) -> vec2<u32>.
 #import macrocell_grid
 
+// The part of the grid outside of which no block is active. All of it comes from memory.
+fn macrocell_active(grid: MacrocellGrid) -> MacrocellGrid {
+    let box = grid.active_box;
+    let words = vec4<u32>(macrocell_mask(box), macrocell_mask(box + 1u));
+    var part = grid;
+    part.first_block = bitcast<vec3<i32>>(words.xyz);
+    part.has_third_level = words.w;
+    part.last_cell = bitcast<vec3<i32>>(vec3<u32>(macrocell_mask(box + 2u), macrocell_mask(box + 3u).x));
+    return part;
+}
+
 fn macrocell_bit(mask: vec2<u32>, position: vec3<i32>) -> bool {
     let bit = u32((position.x & 3) | ((position.y & 3) << 2u) | ((position.z & 3) << 4u));
     return ((select(mask.x, mask.y, bit >= 32u) >> (bit & 31u)) & 1u) != 0u;

@@ -26,6 +26,40 @@ fn bit(mask: u64, position: [i32; 3]) -> bool {
 }
 
 impl Masks {
+    /// First block and last dual cell, on each axis, of the box of all active blocks, to the granularity of
+    /// the coarsest level's children; twin of `shader/active_box.wgsl`.
+    pub fn active_box(&self, grid: &Grid) -> [[i32; 3]; 2] {
+        let third = grid.has_third_level();
+        let (first, edge) = if third { (grid.coarse_count(), 4) } else { (0, 1) };
+        let (mut low, mut high) = ([1 << 24; 3], [0; 3]);
+        for (index, &mask) in (0u64..).zip(&self.words[first as usize..]) {
+            let cell = if third { grid.third_position(index) } else { grid.coarse_position(index) };
+            for child in (0..64u32).filter(|child| (mask >> child) & 1 != 0) {
+                for axis in 0..3 {
+                    let place = (4 * cell[axis] + ((child >> (2 * axis)) & 3)) as i32;
+                    low[axis] = low[axis].min(place);
+                    high[axis] = high[axis].max(place + 1);
+                }
+            }
+        }
+        let last = grid.last_cell();
+        [low.map(|b| b * edge), std::array::from_fn(|a| (4 * edge * high[a] - 1).min(last[a]))]
+    }
+
+    /// What the GPU's buffer holds: the masks and the active box.
+    pub fn buffer(&self, grid: &Grid) -> Vec<u64> {
+        let [first, last] = self.active_box(grid).map(|v| v.map(|v| u64::from(v as u32)));
+        let third = u64::from(grid.has_third_level());
+        let mut words = self.words.clone();
+        words.extend([
+            first[0] | first[1] << 32,
+            first[2] | third << 32,
+            last[0] | last[1] << 32,
+            last[2],
+        ]);
+        words
+    }
+
     /// Whether the block is active.
     pub fn block_active(&self, grid: &Grid, block: [u32; 3]) -> bool {
         let coarse = block.map(|b| b / 4);

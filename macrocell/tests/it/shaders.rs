@@ -6,8 +6,14 @@ use macrocell::{Activate, Ranges};
 
 use crate::walk_gpu::walk_source;
 
-fn sources() -> [KernelSource; 4] {
-    [Ranges::source(), Activate::source(), Activate::third_level_source(), walk_source()]
+fn sources() -> [KernelSource; 5] {
+    [
+        Ranges::source(),
+        Activate::source(),
+        Activate::third_level_source(),
+        Activate::active_box_source(),
+        walk_source(),
+    ]
 }
 
 fn kind(binding: &Binding) -> BindingKind {

@@ -32,21 +32,23 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let ray = dda_ray(rays[2u * id.x].xyz, rays[2u * id.x + 1u].xyz);
-    let volume = DdaBox(vec3<i32>(0), params.grid.last_cell);
+    let grid = macrocell_active(params.grid);
+    let box = DdaBox(4 * grid.first_block, grid.last_cell);
     var count = 0u;
-    if (dda_meets(ray, volume)) {
-        let entry = dda_entry(ray, volume);
-        var place = MacrocellPlace(entry, dda_cell_after(ray, entry, volume, dda_first_cells(ray, volume)) >> vec3<u32>(2u));
+    if (all(box.low <= box.high) && dda_meets(ray, box)) {
+        let entry = dda_entry(ray, box);
+        let cell = dda_cell_after(ray, entry, box, dda_first_cells(ray, box));
+        var place = MacrocellPlace(entry, cell >> vec3<u32>(2u));
         while (count < BLOCKS) {
-            place = macrocell_advance(params.grid, ray, place);
-            if (!macrocell_inside(params.grid, place.block)) {
+            place = macrocell_advance(grid, ray, place);
+            if (!macrocell_inside(grid, place.block)) {
                 break;
             }
-            let cell = vec3<u32>(macrocell_first_cell(params.grid, ray, place));
+            let cell = vec3<u32>(macrocell_first_cell(grid, ray, place));
             let packed_cell = cell.x | (cell.y << 10u) | (cell.z << 20u);
             visits[id.x].blocks[count] = vec2<u32>(packed_cell, bitcast<u32>(place.event.t));
             count++;
-            place = macrocell_leave(params.grid, ray, place);
+            place = macrocell_leave(grid, ray, place);
         }
     }
     visits[id.x].inverse = ray.inverse;

@@ -23,8 +23,10 @@ struct WalkParams {
     coarse: [u32; 3],
     has_third_level: u32,
     third: [u32; 3],
-    pad0: u32,
+    active_box: u32,
     last_cell: [i32; 3],
+    pad0: u32,
+    first_block: [i32; 3],
     pad1: u32,
     rays: u32,
     pad2: [u32; 3],
@@ -62,14 +64,16 @@ fn on_gpu(grid: &Grid, masks: &Masks, rays: &[Ray]) -> Vec<Visits> {
         coarse: grid.coarse(),
         has_third_level: grid.has_third_level().into(),
         third: grid.third(),
-        pad0: 0,
+        active_box: grid.mask_count() as u32,
         last_cell: grid.last_cell(),
+        pad0: 0,
+        first_block: [0; 3],
         pad1: 0,
         rays: rays.len() as u32,
         pad2: [0; 3],
     };
     let params = gpu.buffer(bytemuck::cast_slice(&[params]), BufferUsages::UNIFORM);
-    let masks = gpu.buffer(bytemuck::cast_slice(&masks.words), BufferUsages::STORAGE);
+    let masks = gpu.buffer(bytemuck::cast_slice(&masks.buffer(grid)), BufferUsages::STORAGE);
     let lists: Vec<[f32; 8]> = rays
         .iter()
         .map(|Ray { origin: [ox, oy, oz], direction: [dx, dy, dz], .. }| {
@@ -162,9 +166,11 @@ fn parameters_lie_where_the_host_writes_them() {
         ("coarse", 16, 12),
         ("has_third_level", 28, 4),
         ("third", 32, 12),
-        ("pad0", 44, 4),
+        ("active_box", 44, 4),
         ("last_cell", 48, 12),
-        ("pad1", 60, 4),
+        ("pad0", 60, 4),
+        ("first_block", 64, 12),
+        ("pad1", 76, 4),
     ];
     gpu_testkit::layout::check_struct(&text, "MacrocellGrid", &grid).unwrap();
 }

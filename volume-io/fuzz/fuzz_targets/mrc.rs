@@ -1,7 +1,5 @@
-//! MRC maps.
+//! `exercise::mrc` on what libFuzzer finds.
 
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
-    exercise::exercise_magic("fuzz.mrc", bytes, 208, b"MAP ");
-});
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| exercise::mrc(bytes));

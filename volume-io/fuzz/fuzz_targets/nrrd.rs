@@ -1,7 +1,5 @@
-//! NRRD with an attached header.
+//! `exercise::nrrd` on what libFuzzer finds.
 
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
-    exercise::exercise_magic("fuzz.nrrd", bytes, 0, b"NRRD000");
-});
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| exercise::nrrd(bytes));

@@ -1,9 +1,5 @@
-//! Samples with a layout from the input.
+//! `exercise::raw` on what libFuzzer finds.
 
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
-    if let Some((options, rest)) = exercise::with_layout(bytes, true) {
-        exercise::exercise("fuzz.raw", rest, &options);
-    }
-});
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| exercise::raw(bytes));

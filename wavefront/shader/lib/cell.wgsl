@@ -127,7 +127,8 @@ fn cell_first_crossing(b: vec4<f32>, inside_low: bool, inside_high: bool) -> Cel
 }
 
 // The crossing inside a bracket: false position with halved weights, every other step a bisection,
-// until the bracket is 2^-22 of the segment or the field is exactly 0.
+// until the bracket is 2^-22 of the segment or the field is exactly 0. Where it is 0 at an end of the
+// bracket, false position would take that end for the crossing, which lies elsewhere: only bisection then.
 fn cell_root(b: vec4<f32>, bracket: CellBracket, inside_low: bool) -> f32 {
     var low = bracket.low;
     var high = bracket.high;
@@ -138,7 +139,8 @@ fn cell_root(b: vec4<f32>, bracket: CellBracket, inside_low: bool) -> f32 {
         let width = high - low;
         var share = 0.5;
         let change = value_low - value_high;
-        if ((step & 1u) == 0u && abs(change) > 1.0e-37) {
+        let ends_count = value_low != 0.0 && value_high != 0.0;
+        if ((step & 1u) == 0u && ends_count && abs(change) > 1.0e-37) {
             share = clamp(value_low / change, 0.0, 1.0);
         }
         root = low + width * share;

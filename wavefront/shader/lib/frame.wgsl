@@ -25,7 +25,7 @@ struct FrameParams {
     shift_y: u32,
     shift_z: u32,
     shift_misses: u32,
-    pad0: u32,
+    most_cells: u32, // RunAhead: cells that one walk of all listed rays visits
     grid: MacrocellGrid,
     lru: LruParams,
 }
@@ -47,14 +47,6 @@ fn frame_ray(frame: FrameParams, pixel: vec2<u32>) -> FrameRay {
 // ends at a value made of uniforms alone; with this zero added it is not.
 fn frame_zero(loaded: u32) -> u32 {
     return loaded >> 31u;
-}
-
-// The grids, for loops over them.
-fn frame_grid(frame: FrameParams, loaded: u32) -> MacrocellGrid {
-    var grid = frame.grid;
-    grid.last_cell += vec3<i32>(i32(frame_zero(loaded)));
-    grid.has_third_level += frame_zero(loaded);
-    return grid;
 }
 
 // Status of a ray in the two upper bits of its state; the lower ones hold its block, those between them
@@ -95,9 +87,12 @@ const RAYS_ENTERED: u32 = 1u;  // rays that enter the volume
 const RAYS_HITS: u32 = 2u;     // hits shaded so far
 const RAYS_LISTED: u32 = 3u;   // length of the active list
 const RAYS_LISTS: u32 = 4u;    // lists made so far in the frame; none is made when no ray is active
-const RAYS_OPEN_NOW: u32 = 5u; // RAYS_OPEN of the round that is going on
-const RAYS_OPEN: u32 = 6u;     // f32 bits: most voxels in which an active ray's first hit may still lie
-const RAYS_HEADER: u32 = 8u;
+const RAYS_CELLS: u32 = 5u;      // RunAhead: cells that the walk since the last list visited
+const RAYS_MOST_CELLS: u32 = 6u; // the most of any walk of the frame
+const RAYS_CUT: u32 = 7u;        // walks of a ray, so far in the frame, that the bound ended
+const RAYS_OPEN_NOW: u32 = 8u; // RAYS_OPEN of the round that is going on
+const RAYS_OPEN: u32 = 9u;     // f32 bits: most voxels in which an active ray's first hit may still lie
+const RAYS_HEADER: u32 = 12u;
 
 // The word that holds the active bit of a ray, which is its number's lowest five bits.
 fn frame_active_word(frame: FrameParams, ray: u32) -> u32 {

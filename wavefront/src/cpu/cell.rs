@@ -20,6 +20,9 @@ pub struct Bracket {
     pub high: f32,
 }
 
+/// Most evaluations in the search for a root.
+pub const MOST_STEPS: u32 = 48;
+
 fn mix(a: f32, b: f32, w: f32) -> f32 {
     a * (1.0 - w) + b * w
 }
@@ -167,23 +170,31 @@ pub fn crossings(b: [f32; 4], inside_low: bool, inside_high: bool) -> Vec<Bracke
 
 /// The crossing inside a bracket.
 pub fn root(b: [f32; 4], bracket: Bracket, inside_low: bool) -> f32 {
+    root_and_steps(b, bracket, inside_low).0
+}
+
+/// The crossing inside a bracket, and the number of evaluations of the field that it took beside those at
+/// the bracket's ends.
+pub fn root_and_steps(b: [f32; 4], bracket: Bracket, inside_low: bool) -> (f32, u32) {
     let Bracket { mut low, mut high } = bracket;
     let (mut value_low, mut value_high) = (at(b, low), at(b, high));
     let mut root = low;
-    for step in 0..48 {
+    for step in 0..MOST_STEPS {
         let width = high - low;
         let change = value_low - value_high;
         let mut share = 0.5_f32;
-        if step % 2 == 0 && change.abs() > 1.0e-37 {
+        // At an end where the field is 0 there need be no crossing.
+        let ends_count = value_low != 0.0 && value_high != 0.0;
+        if step % 2 == 0 && ends_count && change.abs() > 1.0e-37 {
             share = (value_low / change).clamp(0.0, 1.0);
         }
         root = low + width * share;
         if width <= 2.384_186e-7 {
-            break;
+            return (root, step);
         }
         let value = at(b, root);
         if value == 0.0 {
-            break;
+            return (root, step + 1);
         }
         if (value >= 0.0) == inside_low {
             low = root;
@@ -195,5 +206,5 @@ pub fn root(b: [f32; 4], bracket: Bracket, inside_low: bool) -> f32 {
             value_low *= 0.5;
         }
     }
-    root
+    (root, MOST_STEPS)
 }

@@ -81,3 +81,36 @@ pub fn steps(
     }
     steps
 }
+
+/// The cells of [`steps`] in which the ray crosses the surface, with the number of crossings.
+///
+/// # Errors
+/// Where the walk leaks: a cell whose sides do not join those of its neighbours, or whose crossings do not
+/// add up to its sides.
+pub fn crossings(steps: &[Step]) -> Result<Vec<([i32; 3], usize)>, String> {
+    let mut found = Vec::new();
+    for (n, step) in steps.iter().enumerate() {
+        if n > 0 && steps[n - 1].inside_high != step.inside_low {
+            return Err(format!("{:?} and {step:?} see different sides", steps[n - 1]));
+        }
+        let count = match step.bernstein {
+            Some(b) => {
+                let all = cell::crossings(b, step.inside_low, step.inside_high);
+                if all.first().copied()
+                    != cell::first_crossing(b, step.inside_low, step.inside_high)
+                {
+                    return Err(format!("the first of {all:?} is not the first"));
+                }
+                all.len()
+            }
+            None => 0,
+        };
+        if count % 2 != usize::from(step.inside_low != step.inside_high) {
+            return Err(format!("{count} crossings in {step:?}"));
+        }
+        if count > 0 {
+            found.push((step.place.cell, count));
+        }
+    }
+    Ok(found)
+}

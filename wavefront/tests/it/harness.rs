@@ -11,8 +11,8 @@ use macrocell::Grid;
 use macrocell::cpu::ranges;
 use macrocell::cpu::skip::Masks;
 use wavefront::{
-    Camera, FrameParams, FrameView, LookAhead, OutputTextures, Outputs, RayBuffers, Rays, RunAhead,
-    SampleLayout, Samples, Scene, Shading, ShadingParams, Strategy, WavefrontPlan, wgpu,
+    Camera, Counters, FrameParams, FrameView, LookAhead, OutputTextures, Outputs, RayBuffers, Rays,
+    RunAhead, SampleLayout, Samples, Scene, Shading, ShadingParams, Strategy, WavefrontPlan, wgpu,
 };
 
 /// Width of all pictures: rows of 4-byte pixels are then aligned for copies.
@@ -183,6 +183,19 @@ impl Stage {
         masks: &Masks,
         padding: &dyn Fn(usize) -> f32,
     ) -> Picture {
+        let (picture, rounds) = self.render_within(shot, masks, padding, u32::MAX);
+        assert_eq!(rounds.len(), 1, "one round finishes every ray");
+        picture
+    }
+
+    /// Rounds until every ray is finished, whose walks visit at most `most_cells`, and the counters after each.
+    pub(crate) fn render_within(
+        &self,
+        shot: &Shot<'_>,
+        masks: &Masks,
+        padding: &dyn Fn(usize) -> f32,
+        most_cells: u32,
+    ) -> (Picture, Vec<Counters>) {
         let (device, ledger) = (&self.device, Ledger::new());
         let plan = self.cache_plan(shot.field);
         let blocks = shot.field.grid().block_count() as u32;
@@ -191,11 +204,15 @@ impl Stage {
         let size = [WIDTH, shot.height];
         let wavefront = WavefrontPlan::new(size, OUTPUTS, &device.limits()).unwrap();
         let textures = OutputTextures::new(device, &ledger, OUTPUTS, size);
-        let words: Vec<u32> =
-            masks.words.iter().flat_map(|&w| [w as u32, (w >> 32) as u32]).collect();
+        let words: Vec<u32> = masks
+            .buffer(&shot.field.grid())
+            .iter()
+            .flat_map(|&w| [w as u32, (w >> 32) as u32])
+            .collect();
         let masks = self.buffer(&words);
         let samples = Samples::Cached(&cache);
-        let rays = RayBuffers::new(device, &ledger, &self.rays, &wavefront, samples, &textures);
+        let rays =
+            RayBuffers::new(device, &ledger, &self.rays, &wavefront, &masks, samples, &textures);
         let scene = Scene { rays: &rays, masks: &masks, samples };
         let rounds = self.run_ahead.bind(device, &ledger, scene).unwrap();
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
@@ -206,23 +223,29 @@ impl Stage {
         (0..blocks).for_each(|block| twin.insert(block, block));
         self.store(&mut encoder, cache.directory(), &twin.directory);
         let view = shot.view();
-        let params = view.params(shot.field.grid(), plan.params(), shot.isovalue, LookAhead::NONE);
+        let params = self.params(shot).with_most_cells(most_cells);
         let identity = glam::DMat4::IDENTITY.to_cols_array_2d();
         let shading = ShadingParams::new(&Shading::default(), identity);
         let mut upload = UploadRing::new(&ledger, "test", 1024);
         self.rays.record_start(device, &mut encoder, &mut upload, &rays, &params, &shading);
         rounds.record_start(&mut encoder, &self.rays, &rays);
-        rounds.record_round(&mut encoder, &self.rays, &rays, &mut |_| {});
-        gpu::submit_and_wait(device, &self.queue, encoder);
-        let active = gpu::read_u32s(device, &self.queue, rays.rays())[0];
-        assert_eq!(active, 0, "one round finishes every ray");
-        Picture {
+        let mut counters = Vec::new();
+        while counters.last().is_none_or(|counters: &Counters| counters.active > 0) {
+            rounds.record_round(&mut encoder, &self.rays, &rays, &mut |_| {});
+            let next = wgpu::CommandEncoderDescriptor::default();
+            let next = device.create_command_encoder(&next);
+            gpu::submit_and_wait(device, &self.queue, std::mem::replace(&mut encoder, next));
+            let words = gpu::read_u32s(device, &self.queue, rays.rays());
+            counters.push(bytemuck::pod_read_unaligned(bytemuck::cast_slice(&words[..8])));
+        }
+        let picture = Picture {
             color: self.read(textures.color(), 1),
             depth: self.read(textures.depth().unwrap(), 1),
             normal: self.read(textures.normal().unwrap(), 2),
             status: self.read(textures.status().unwrap(), 1),
             start_depth: view.start_depth(),
-        }
+        };
+        (picture, counters)
     }
 
     fn read(&self, texture: &wgpu::Texture, words: u32) -> Vec<u32> {

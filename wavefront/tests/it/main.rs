@@ -5,5 +5,7 @@
 
 mod fields;
 mod harness;
+mod roots;
+mod symmetry;
 mod twin;
 mod watertight;

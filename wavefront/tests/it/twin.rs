@@ -119,3 +119,29 @@ fn a_different_pixel_is_found() {
     assert!(difference(&picture, &moved).ulps > 10_000);
     assert_eq!(difference(&picture, &moved).far, good.far + 1);
 }
+
+/// Rays that are cut short go on where they stopped: the same bits, in more rounds, none of which visits more
+/// cells than it may.
+#[test]
+fn a_bound_on_the_cells_of_a_walk_changes_no_bit() {
+    let stage = Stage::new();
+    let field = noisy([61, 43, 37]);
+    // Noise is active everywhere; just below its largest sample most rays pass between the hits.
+    let isovalue = 0.97 * field.samples.iter().fold(f32::NEG_INFINITY, |a, &b| a.max(b));
+    let shot =
+        Shot { field: &field, camera: orbit(field.dims, 33.0, 21.0, 40), isovalue, height: 40 };
+    let (masks, zero) = (field.masks(isovalue), |_: usize| 0.0);
+    let (expected, free) = stage.render_within(&shot, &masks, &zero, u32::MAX);
+    assert_eq!((free.len(), free[0].cut), (1, 0));
+    assert!(expected.hits() > 0 && free[0].most_cells > 10 * free[0].entered);
+    let rays = free[0].entered;
+    for most_cells in [0, 10 * rays, 11 * rays, 25 * rays, free[0].most_cells] {
+        let (found, rounds) = stage.render_within(&shot, &masks, &zero, most_cells);
+        assert!(found == expected, "{most_cells} cells");
+        assert!(rounds.len() > 1 && rounds[0].cut > 0, "{most_cells} cells");
+        // A ray visits a block at least, which has 10 cells at most on its way.
+        let most = rounds.iter().map(|counters| counters.most_cells).max();
+        assert!(most.unwrap() <= most_cells.max(10 * rays), "{most:?} of {most_cells} cells");
+        println!("{most_cells} cells: {} rounds, at most {most:?} cells", rounds.len());
+    }
+}

@@ -2,9 +2,7 @@
 
 use macrocell::cpu::dda::Ray;
 use proptest::prelude::*;
-use wavefront::cpu::block_walk::Step;
-use wavefront::cpu::cell::{crossings, first_crossing};
-use wavefront::cpu::walk::{first_hit, steps};
+use wavefront::cpu::walk::{crossings, first_hit, steps};
 
 use crate::harness::Field;
 
@@ -46,33 +44,6 @@ fn rays() -> impl Strategy<Value = Ray> {
     })
 }
 
-/// Crossings of every cell of a walk; a cell whose sides do not join those of its neighbours is an error.
-fn all_crossings(steps: &[Step]) -> Result<Vec<([i32; 3], usize)>, String> {
-    let mut found = Vec::new();
-    for (n, step) in steps.iter().enumerate() {
-        if n > 0 && steps[n - 1].inside_high != step.inside_low {
-            return Err(format!("{:?} and {step:?} see different sides", steps[n - 1]));
-        }
-        let count = match step.bernstein {
-            Some(b) => {
-                let all = crossings(b, step.inside_low, step.inside_high);
-                if all.first().copied() != first_crossing(b, step.inside_low, step.inside_high) {
-                    return Err(format!("the first of {all:?} is not the first"));
-                }
-                all.len()
-            }
-            None => 0,
-        };
-        if count % 2 != usize::from(step.inside_low != step.inside_high) {
-            return Err(format!("{count} crossings in {step:?}"));
-        }
-        if count > 0 {
-            found.push((step.place.cell, count));
-        }
-    }
-    Ok(found)
-}
-
 proptest! {
     #![proptest_config(gpu_testkit::property(10_000))]
 
@@ -84,7 +55,7 @@ proptest! {
     ) {
         let sample = |p: [i32; 3]| field.at(p);
         let steps = steps(&field.grid(), &ray, isovalue, &sample);
-        let all = all_crossings(&steps).map_err(TestCaseError::fail)?;
+        let all = crossings(&steps).map_err(TestCaseError::fail)?;
         if let (Some(first), Some(last)) = (steps.first(), steps.last()) {
             let hits: usize = all.iter().map(|&(_, count)| count).sum();
             prop_assert_eq!(hits % 2 == 1, first.inside_low != last.inside_high);
@@ -110,10 +81,10 @@ fn a_wrong_side_is_noticed() {
     let field = Field::new([6, 6, 6], |[x, _, _]| x as f32 - 2.5);
     let ray = Ray::new([-1.0, 2.3, 2.6], [1.0, 0.0, 0.0]);
     let good = steps(&field.grid(), &ray, 0.0, &|p| field.at(p));
-    assert_eq!(all_crossings(&good), Ok(vec![([2, 2, 2], 1)]));
+    assert_eq!(crossings(&good), Ok(vec![([2, 2, 2], 1)]));
     for n in 0..good.len() {
         let mut bad = good.clone();
         bad[n].inside_high = !bad[n].inside_high;
-        assert!(all_crossings(&bad).is_err(), "step {n}");
+        assert!(crossings(&bad).is_err(), "step {n}");
     }
 }

@@ -1,11 +1,10 @@
 //! How far a picture computed in f32 may be from the f64 reference: the bounds that
 //! `docs/numerics.md` derives, in code.
 
-use gpu_testkit::reference::{Ray, Scene};
-use progressive_iso::FrameView;
+use crate::reference::{Ray, Scene};
 
 /// Unit roundoff of f32.
-pub(crate) const U: f64 = 1.0 / 16_777_216.0;
+pub const U: f64 = 1.0 / 16_777_216.0;
 
 /// Roundings of a field value in units of U times the largest corner value: one subtraction, three
 /// for each of six interpolations, three for the sums of polar forms, the rest for turning points.
@@ -14,16 +13,21 @@ const VALUE_ROUNDINGS: f64 = 32.0;
 /// Width of the bracket at which the root search stops, as a share of a cell's diagonal.
 const BRACKET: f64 = 4.0 * U * 1.733;
 
-/// The affine map from pixels to rays, recovered from three rays.
-pub(crate) struct RayErrors {
+/// Origin (voxels), unit direction, and view depth per voxel of a pixel's ray, in f64.
+pub type PixelRay = ([f64; 3], [f64; 3], f64);
+
+/// The affine map from pixels to rays, recovered from three rays: it tells what f32 does to each.
+#[derive(Clone, Copy, Debug)]
+pub struct RayErrors {
     size: [u32; 2],
+    start_depth: f64,
     origin: [[f64; 3]; 3],
     direction: [[f64; 3]; 3],
 }
 
 /// What f32 does to one ray.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct RayError {
+pub struct RayError {
     /// Voxels.
     origin: [f64; 3],
     /// Voxels per voxel of t.
@@ -31,10 +35,26 @@ pub(crate) struct RayError {
     unit: [f64; 3],
 }
 
+/// The ray of a pixel, how depth is counted along it, and how well f32 knows it.
+#[derive(Clone, Copy, Debug)]
+pub struct Sight {
+    /// The ray in f64; t counts voxels.
+    pub ray: Ray,
+    /// View depth in world units gained per voxel.
+    pub depth_per_voxel: f64,
+    /// View depth in world units at t = 0.
+    pub start_depth: f64,
+    /// What f32 does to the ray.
+    pub error: RayError,
+}
+
 impl RayErrors {
-    pub(crate) fn new(view: &FrameView, size: [u32; 2]) -> Self {
+    /// For a picture of `size` pixels; `ray` gives the ray of any pixel, also of those next to the
+    /// picture.
+    #[must_use]
+    pub fn new(size: [u32; 2], start_depth: f64, ray: impl Fn([u32; 2]) -> PixelRay) -> Self {
         let at = |pixel| {
-            let (origin, unit, depth_per_voxel) = view.ray(pixel);
+            let (origin, unit, depth_per_voxel) = ray(pixel);
             (origin, unit.map(|d| d / depth_per_voxel))
         };
         let [zero, right, down] = [at([0, 0]), at([1, 0]), at([0, 1])];
@@ -49,32 +69,56 @@ impl RayErrors {
         };
         Self {
             size,
+            start_depth,
             origin: affine(zero.0, right.0, down.0),
             direction: affine(zero.1, right.1, down.1),
         }
     }
 
-    /// Each of the three terms of a sum is rounded at most four times.
-    pub(crate) fn of(&self, view: &FrameView, pixel: [u32; 2]) -> RayError {
+    /// The ray of a pixel with its error: each of the three terms of a sum is rounded at most four
+    /// times.
+    #[must_use]
+    pub fn sight(&self, pixel: [u32; 2], ray: PixelRay) -> Sight {
         let offset = [0, 1].map(|a| f64::from(pixel[a]) + 0.5 - 0.5 * f64::from(self.size[a]));
         let sum = |v: &[[f64; 3]; 3], i: usize| {
             v[0][i].abs() + (offset[0] * v[1][i]).abs() + (offset[1] * v[2][i]).abs()
         };
-        let (_, unit, depth_per_voxel) = view.ray(pixel);
-        RayError {
+        let (origin, unit, depth_per_voxel) = ray;
+        let error = RayError {
             origin: [0, 1, 2].map(|i| 4.0 * U * sum(&self.origin, i)),
             direction: [0, 1, 2].map(|i| {
                 depth_per_voxel * 4.0 * U * sum(&self.direction, i) + U * unit[i].abs() + 1e-12
             }),
             unit,
-        }
+        };
+        let ray = Ray { origin, direction: unit, t_min: 0.0 };
+        Sight { ray, depth_per_voxel, start_depth: self.start_depth, error }
+    }
+}
+
+impl Sight {
+    /// Parameter of a hit, from its depth.
+    #[must_use]
+    pub fn parameter(&self, depth: f32) -> f64 {
+        (f64::from(depth) - self.start_depth) / self.depth_per_voxel
+    }
+
+    /// How far the parameter of a hit read from the depth output may be from that of a point where
+    /// the GPU's field is zero: the root search's bracket, the mix of two parameters, the depth's
+    /// roundings.
+    #[must_use]
+    pub fn parameter_error(&self, t: f64) -> f64 {
+        let depth = self.start_depth + t * self.depth_per_voxel;
+        let depth_error = U * (self.start_depth.abs() + 2.0 * depth.abs()) / self.depth_per_voxel;
+        BRACKET + 4.0 * U * t + depth_error
     }
 }
 
 impl RayError {
     /// How far a point of the GPU's ray at parameter `t` may be from the true one on each axis:
     /// rounded origin and direction, rounded parameters of planes, rounded local coordinates.
-    pub(crate) fn position(&self, t: f64) -> [f64; 3] {
+    #[must_use]
+    pub fn position(&self, t: f64) -> [f64; 3] {
         [0, 1, 2].map(|i| {
             self.origin[i] + t * (self.direction[i] + 7.0 * U * self.unit[i].abs()) + 2.0 * U
         })
@@ -83,15 +127,17 @@ impl RayError {
 
 /// The samples around a position: its cell and the neighbouring ones.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Around {
+pub struct Around {
     /// Largest |sample - isovalue|.
-    pub(crate) largest: f64,
+    pub largest: f64,
     /// Largest difference of neighbouring samples on each axis.
-    pub(crate) steps: [f64; 3],
+    pub steps: [f64; 3],
 }
 
 impl Around {
-    pub(crate) fn new(dims: [u32; 3], samples: &[f32], isovalue: f64, position: [f64; 3]) -> Self {
+    /// `samples` holds `dims` values, x fastest; the position is in voxels.
+    #[must_use]
+    pub fn new(dims: [u32; 3], samples: &[f32], isovalue: f64, position: [f64; 3]) -> Self {
         let last = dims.map(|n| i64::from(n) - 1);
         let first = position.map(|x| x.floor() as i64 - 1);
         let clamped = |axis: usize, offset: i64| (first[axis] + offset).clamp(0, last[axis]);
@@ -114,23 +160,17 @@ impl Around {
     }
 
     /// How far the GPU's value minus isovalue may be from the true one, given its position error.
-    pub(crate) fn value_error(&self, position_error: [f64; 3]) -> f64 {
+    #[must_use]
+    pub fn value_error(&self, position_error: [f64; 3]) -> f64 {
         let moved: f64 = (0..3).map(|a| self.steps[a] * position_error[a]).sum();
         VALUE_ROUNDINGS * U * self.largest + moved
     }
 }
 
-/// How far the parameter of a hit read from the depth output may be from that of a point where the
-/// GPU's field is zero: the root search's bracket, the mix of two parameters, the depth's roundings.
-pub(crate) fn parameter_error(view: &FrameView, depth_per_voxel: f64, t: f64) -> f64 {
-    let depth = view.start_depth() + t * depth_per_voxel;
-    let depth_error = U * (view.start_depth().abs() + 2.0 * depth.abs()) / depth_per_voxel;
-    BRACKET + 4.0 * U * t + depth_error
-}
-
 /// How far one has to go from `t`, forwards (`sign` = 1) or backwards, until the true field is
 /// farther than `error` from the isovalue; `None` when that does not happen within a voxel.
-pub(crate) fn reach(scene: &Scene<'_>, ray: &Ray, t: f64, sign: f64, error: f64) -> Option<f64> {
+#[must_use]
+pub fn reach(scene: &Scene<'_>, ray: &Ray, t: f64, sign: f64, error: f64) -> Option<f64> {
     let mut distance = 1e-7;
     while distance < 1.0 {
         if scene.value(ray.at(t + sign * distance)).abs() > error {

@@ -1,0 +1,5 @@
+//! `exercise::decode` on what libFuzzer finds.
+
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| exercise::decode(bytes));
