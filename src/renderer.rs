@@ -1,5 +1,8 @@
 //! The renderer: schedule and state.
 
+#[cfg(test)]
+mod slots_tests;
+
 use gpu_primitives::kernel::dispatches_recorded;
 use gpu_primitives::memory::{Category, Ledger};
 use gpu_primitives::upload::UploadRing;

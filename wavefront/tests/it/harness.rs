@@ -235,8 +235,10 @@ impl Stage {
             let next = wgpu::CommandEncoderDescriptor::default();
             let next = device.create_command_encoder(&next);
             gpu::submit_and_wait(device, &self.queue, std::mem::replace(&mut encoder, next));
-            let words = gpu::read_u32s(device, &self.queue, rays.rays());
-            counters.push(bytemuck::pod_read_unaligned(bytemuck::cast_slice(&words[..8])));
+            let bytes = gpu::read_buffer(device, &self.queue, rays.rays());
+            let (offset, length) = Counters::BYTES;
+            let counted = &bytes[offset as usize..][..length as usize];
+            counters.push(bytemuck::pod_read_unaligned(counted));
         }
         let picture = Picture {
             color: self.read(textures.color(), 1),
