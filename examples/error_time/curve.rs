@@ -53,7 +53,7 @@ pub struct Curve {
 impl Curve {
     /// The setting in words.
     pub fn label(&self) -> String {
-        format!("{}, {}, {} bits", self.strategy, self.residency.name(), self.rate)
+        format!("{}, {}, {} bit/voxel", self.strategy, self.residency.name(), self.rate)
     }
 
     /// Everything but the setting.
