@@ -18,6 +18,7 @@ mod published;
 mod reference;
 mod residency;
 mod stability;
+mod streamed;
 #[path = "../../examples/stability/suite/mod.rs"]
 mod suite;
 mod support;
