@@ -5,7 +5,8 @@ use crate::{Capture, Error, PassReport, ProgressiveIsoRenderer, wgpu};
 
 impl ProgressiveIsoRenderer {
     /// Renders passes until the frame is complete, blocking on the device: for offline use.
-    /// `each` sees every report; returning false stops early.
+    /// `each` sees every report; returning false stops early. A stream that arrives in pieces must be there
+    /// or come from another thread.
     ///
     /// # Errors
     /// If no frame is set, the device fails, or passes stop making progress.

@@ -12,7 +12,7 @@ pub enum Error {
         /// [`crate::RendererOptions::budget_bytes`].
         budget: u64,
     },
-    /// The payload ends too early.
+    /// The stream ends too early.
     #[error(
         "{dims:?} voxels at {bits_per_block} bits per block need {expected} bytes of stream, found {found}"
     )]
@@ -26,6 +26,9 @@ pub enum Error {
         /// Bytes given.
         found: u64,
     },
+    /// The stream of [`crate::CompressedVolume::streamed`] went to another renderer.
+    #[error("the volume's stream is gone: another renderer has loaded it")]
+    StreamTaken,
     /// The device lacks something that every scene needs.
     #[error("the device offers {found} {what}, at least {needed} are needed")]
     UnsupportedDevice {
@@ -66,7 +69,7 @@ pub enum Error {
         active_rays: u32,
     },
     /// The device is lost. Make a renderer on a new one; [`crate::ProgressiveIsoRenderer::volume`] still
-    /// has the stream. In browsers a lost device is seen as [`Error::MapFailed`].
+    /// has the stream, unless that arrived in pieces. In browsers a lost device is seen as [`Error::MapFailed`].
     #[error("the device is lost")]
     DeviceLost,
     /// The device has no memory for what the plan asks for. The renderer stays unusable.

@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod arriving;
 #[cfg(not(target_arch = "wasm32"))]
 mod blocking;
 mod capture;
@@ -18,6 +19,7 @@ mod strategy;
 mod timing;
 mod volume;
 
+pub use arriving::StreamFeed;
 pub use capture::{Capture, PendingCapture};
 pub use error::Error;
 pub use gpu_primitives::memory::Category;

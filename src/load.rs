@@ -112,6 +112,17 @@ impl Loader {
         self.next_region == buffers.ranges.plan().region_count()
     }
 
+    /// Whether there is something to record now.
+    ///
+    /// # Errors
+    /// If the stream ends too early.
+    pub(crate) fn can_go_on(&self, volume: &CompressedVolume) -> Result<bool, Error> {
+        if self.next_byte < volume.layout().stream_bytes() {
+            return volume.has_bytes(self.next_byte);
+        }
+        Ok(true)
+    }
+
     /// Whether no submission uses its staging memory.
     pub(crate) fn is_idle(&self) -> bool {
         self.upload.is_idle()
@@ -142,11 +153,10 @@ impl Loader {
         let VolumeBuffers { payload, ranges, .. } = buffers;
         let length = volume.layout().stream_bytes();
         if self.next_byte < length {
-            let end = (self.next_byte + self.chunk).min(length);
-            let piece = &volume.bytes()[self.next_byte as usize..end as usize];
-            payload.record_upload(device, encoder, &mut self.upload, self.next_byte, piece)?;
-            self.next_byte = end;
-            if end < length {
+            let piece = volume.read(self.next_byte, self.chunk);
+            payload.record_upload(device, encoder, &mut self.upload, self.next_byte, &piece)?;
+            self.next_byte += piece.len() as u64;
+            if self.next_byte < length {
                 return Ok(());
             }
         }

@@ -73,6 +73,11 @@ impl RendererOptions {
         let depth = self.outputs.depth || self.draw_target.is_some();
         Outputs { depth, ..self.outputs }
     }
+
+    /// What pictures there are and where they go.
+    pub(crate) fn pictures(&self) -> (Outputs, Option<DrawTarget>) {
+        (self.all_outputs(), self.draw_target)
+    }
 }
 
 /// What one picture shows.

@@ -292,7 +292,7 @@ impl ProgressiveIsoRenderer {
     fn advance(&mut self, device: &wgpu::Device) -> Result<bool, Error> {
         if let Phase::Loading(loader) = &self.phase {
             if !loader.is_recorded(&self.buffers) {
-                return Ok(true);
+                return loader.can_go_on(&self.volume);
             }
             if !(self.records.is_idle() && loader.is_idle()) {
                 return Ok(false);
@@ -477,27 +477,46 @@ impl ProgressiveIsoRenderer {
         self.clear_cache = true;
     }
 
-    /// Changes the picture's size. The current frame starts again, with decoded blocks kept where
-    /// the budget still holds them all.
+    /// Changes the picture's size: [`Self::set_options`] with another size.
     ///
     /// # Errors
-    /// If the new size does not fit the limits or the budget; nothing changes then. Or what went wrong with
-    /// the device.
+    /// As [`Self::set_options`].
     pub fn resize(&mut self, device: &wgpu::Device, size: [u32; 2]) -> Result<(), Error> {
-        let options = RendererOptions { size, ..self.options };
+        self.set_options(device, RendererOptions { size, ..self.options })
+    }
+
+    /// Changes what the renderer was made with, and keeps the volume on the GPU. The current frame starts
+    /// again. Pictures stay as they are, unless their size or kinds change; decoded blocks stay where
+    /// the budget still holds as many.
+    ///
+    /// Decoding every block belongs to loading. So a volume that is resident as a whole stays so or gets a
+    /// cache, and one with a cache keeps to that whatever [`RendererOptions::residency`] says; while it is
+    /// being loaded, neither changes.
+    ///
+    /// # Errors
+    /// If the new options do not fit each other, the limits or the budget; nothing changes then. Or what
+    /// went wrong with the device.
+    pub fn set_options(
+        &mut self,
+        device: &wgpu::Device,
+        options: RendererOptions,
+    ) -> Result<(), Error> {
         let plan = self.replan(&options)?;
+        let pictures = self.options.pictures() != options.pictures();
         let (layout, strategy) = (plan.samples.layout(), plan.strategy);
-        if (layout, strategy) != (self.plan.samples.layout(), self.plan.strategy) {
+        if pictures || (layout, strategy) != (self.plan.samples.layout(), self.plan.strategy) {
             self.stages = self
                 .faults
                 .guard(device, Task::Pipelines, || Stages::new(device, &plan, &options))?;
         }
         // What goes does so before anything comes, or both together would exceed the budget.
         self.release_rays(plan.samples == self.plan.samples);
-        self.faults.guard(device, Task::Other, || {
-            self.pictures.resize(device, &self.ledger, &self.stages, &plan);
-            Ok(())
-        })?;
+        if pictures || options.size != self.options.size {
+            self.faults.guard(device, Task::Other, || {
+                self.pictures.replace(device, &self.ledger, &self.stages, &plan);
+                Ok(())
+            })?;
+        }
         self.options = options;
         self.plan = plan;
         if let Some(state) = self.frame.take() {
@@ -506,8 +525,8 @@ impl ProgressiveIsoRenderer {
         Ok(())
     }
 
-    /// A plan for other options with the same volume. What is resident stays so while the budget
-    /// allows it; what is cached stays cached, because loading is over. Until then, it goes on as it
+    /// A plan for other options with the same volume. What is resident stays so while options and budget
+    /// allow it; what is cached stays cached, because loading is over. Until then, it goes on as it
     /// was planned.
     fn replan(&self, options: &RendererOptions) -> Result<ScenePlan, Error> {
         let load = matches!(self.phase, Phase::Loading(_)).then_some(self.plan.load);
@@ -519,6 +538,7 @@ impl ProgressiveIsoRenderer {
             (Residency::Full, Residency::Auto, None) => {
                 plan(Residency::Full).or_else(|_| plan(Residency::Cached))
             }
+            (Residency::Full, Residency::Cached, None) => plan(Residency::Cached),
             (residency, ..) => plan(residency),
         }
     }

@@ -90,8 +90,8 @@ impl Pictures {
         Self { textures, draw }
     }
 
-    /// Replaces the pictures by others of the plan's size; the old memory goes first.
-    pub(crate) fn resize(
+    /// Replaces the pictures by those of another plan; the old memory goes first.
+    pub(crate) fn replace(
         &mut self,
         device: &wgpu::Device,
         ledger: &Ledger,
@@ -99,7 +99,8 @@ impl Pictures {
         plan: &ScenePlan,
     ) {
         self.draw = None;
-        self.textures.resize(device, ledger, plan.wavefront.size());
+        let (outputs, size) = (plan.wavefront.outputs(), plan.wavefront.size());
+        self.textures.replace(device, ledger, outputs, size);
         self.draw = Self::draw_buffers(device, ledger, stages, &self.textures);
     }
 

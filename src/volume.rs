@@ -1,11 +1,13 @@
 //! The volume a renderer is made for.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::sync::Arc;
 
 use zfp_gpu::StreamLayout;
 
 use crate::Error;
+use crate::arriving::{self, Arriving, Found, StreamFeed};
 
 /// Bytes of a compressed stream, wherever they live: a `Vec`, an `Arc<[u8]>`, a memory map.
 pub type StreamBytes = Arc<dyn AsRef<[u8]> + Send + Sync>;
@@ -17,9 +19,16 @@ pub type StreamBytes = Arc<dyn AsRef<[u8]> + Send + Sync>;
 #[derive(Clone)]
 pub struct CompressedVolume {
     layout: StreamLayout,
-    bytes: StreamBytes,
+    source: Source,
     /// World position of the voxel at index (i, j, k), column-major; must be invertible.
     pub world_from_index: [[f64; 4]; 4],
+}
+
+/// Where a stream's bytes come from.
+#[derive(Clone)]
+enum Source {
+    Whole(StreamBytes),
+    Arriving(Arriving),
 }
 
 impl CompressedVolume {
@@ -39,7 +48,28 @@ impl CompressedVolume {
         if found < expected {
             return Err(Error::ShortStream { dims, bits_per_block, expected, found });
         }
-        Ok(Self { layout, bytes, world_from_index: Self::placed([1.0; 3], [0.0; 3]) })
+        Ok(Self::with_source(layout, Source::Whole(bytes)))
+    }
+
+    /// Like [`CompressedVolume::new`], but the stream arrives through the [`StreamFeed`] while a renderer
+    /// loads it, and its bytes are let go as soon as they are on the way to the GPU. So it never is in main
+    /// memory as a whole, and a single renderer can load it: a second one, for which a clone would have to
+    /// serve, is told [`Error::StreamTaken`].
+    ///
+    /// # Errors
+    /// If the layout is impossible.
+    pub fn streamed(
+        dims: [u32; 3],
+        bits_per_block: u32,
+        first_bit: u64,
+    ) -> Result<(Self, StreamFeed), Error> {
+        let layout = StreamLayout::new(dims, bits_per_block, first_bit)?;
+        let (feed, arriving) = arriving::channel();
+        Ok((Self::with_source(layout, Source::Arriving(arriving)), feed))
+    }
+
+    fn with_source(layout: StreamLayout, source: Source) -> Self {
+        Self { layout, source, world_from_index: Self::placed([1.0; 3], [0.0; 3]) }
     }
 
     /// Matrix that puts voxel (i, j, k) at `origin + spacing * (i, j, k)`.
@@ -65,8 +95,36 @@ impl CompressedVolume {
         &self.layout
     }
 
-    pub(crate) fn bytes(&self) -> &[u8] {
-        (*self.bytes).as_ref()
+    /// Whether there are bytes to read behind the first `position` ones, which were read before.
+    ///
+    /// # Errors
+    /// If there will be none.
+    pub(crate) fn has_bytes(&self, position: u64) -> Result<bool, Error> {
+        let Source::Arriving(arriving) = &self.source else { return Ok(true) };
+        match arriving.find(position) {
+            Found::Bytes => Ok(true),
+            Found::Nothing => Ok(false),
+            Found::Taken => Err(Error::StreamTaken),
+            Found::End => Err(Error::ShortStream {
+                dims: self.layout.dims,
+                bits_per_block: self.layout.bits_per_block,
+                expected: self.layout.stream_bytes(),
+                found: position,
+            }),
+        }
+    }
+
+    /// Reads at most `most` bytes behind the first `position` ones.
+    pub(crate) fn read(&self, position: u64, most: u64) -> Cow<'_, [u8]> {
+        let most = most.min(self.layout.stream_bytes().saturating_sub(position));
+        match &self.source {
+            Source::Whole(bytes) => {
+                let bytes = (**bytes).as_ref();
+                // Within the slice, as `new` checks.
+                Cow::Borrowed(&bytes[position as usize..(position + most) as usize])
+            }
+            Source::Arriving(arriving) => Cow::Owned(arriving.take(most)),
+        }
     }
 
     /// World-space centre of the volume and the radius of the ball around it, for cameras.
@@ -90,9 +148,18 @@ impl fmt::Debug for CompressedVolume {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("CompressedVolume")
             .field("layout", &self.layout)
-            .field("bytes", &self.bytes().len())
+            .field("source", &self.source)
             .field("world_from_index", &self.world_from_index)
             .finish()
+    }
+}
+
+impl fmt::Debug for Source {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Whole(bytes) => write!(f, "{} bytes", (**bytes).as_ref().len()),
+            Self::Arriving(arriving) => arriving.fmt(f),
+        }
     }
 }
 

@@ -19,6 +19,7 @@ mod published;
 mod reference;
 mod residency;
 mod stability;
+mod streamed;
 #[path = "../../examples/stability/suite/mod.rs"]
 mod suite;
 mod support;

@@ -23,8 +23,8 @@ use crate::sink::Sink;
 use crate::stream::{Conversion, StreamEncoder};
 use crate::volume::ZfpVolume;
 
-pub(crate) use zfp::header_words;
 pub use zfp::write_zfp;
+pub(crate) use zfp::{fixed_rate_header, header_words};
 
 /// Reads a volume from a file; see [`read_bytes`] for what is recognised.
 ///

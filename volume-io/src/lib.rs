@@ -18,6 +18,7 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
+mod arrival;
 mod convert;
 mod encode;
 mod error;
@@ -33,6 +34,7 @@ mod stream;
 mod volume;
 mod write;
 
+pub use arrival::{FixedRateHeader, StreamScan};
 pub use encode::{BlockEncoder, encode};
 pub use error::{Error, Result};
 pub use formats::{convert_bytes, read_bytes, write_zfp};

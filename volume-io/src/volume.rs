@@ -136,7 +136,7 @@ impl ZfpVolume {
     }
 
     fn decoder(&self) -> Decoder {
-        Decoder::new(fixed_rate(self.bits_per_block), ZfpDimensionality::D3)
+        Decoder::fixed_rate(self.bits_per_block)
     }
 }
 
@@ -180,6 +180,7 @@ impl Block {
 }
 
 /// Decodes single blocks wherever they start, by copying their words to an aligned window.
+#[derive(Debug)]
 pub(crate) struct Decoder {
     config: ZfpConfig,
     rank: ZfpDimensionality,
@@ -191,6 +192,11 @@ impl Decoder {
         // Three more words: the shift within the first byte, and the decoder's look-ahead.
         let words = config.max_bits().max(config.min_bits()) as usize / 64 + 3;
         Self { config, rank, window: vec![0; words] }
+    }
+
+    /// For a fixed-rate stream of 3D floats.
+    pub(crate) fn fixed_rate(bits_per_block: u32) -> Self {
+        Self::new(fixed_rate(bits_per_block), ZfpDimensionality::D3)
     }
 
     /// Decodes the block at `first_bit` and returns its length in bits. `samples` holds a whole
@@ -210,12 +216,22 @@ impl Decoder {
     }
 
     fn block(&mut self, volume: &ZfpVolume, index: u64) -> Block {
-        let grid = volume.grid();
-        let origin = grid.origin(index);
-        let mut samples = [0.0f32; 64];
         let first_bit =
             index.saturating_mul(u64::from(volume.bits_per_block)).saturating_add(volume.first_bit);
-        if self.decode(&volume.bytes, first_bit, &mut samples).is_err() {
+        self.block_at(&volume.bytes, first_bit, &volume.grid(), index)
+    }
+
+    /// Block `index`, which starts at `first_bit` of `bytes`.
+    pub(crate) fn block_at(
+        &mut self,
+        bytes: &[u8],
+        first_bit: u64,
+        grid: &Grid,
+        index: u64,
+    ) -> Block {
+        let origin = grid.origin(index);
+        let mut samples = [0.0f32; 64];
+        if self.decode(bytes, first_bit, &mut samples).is_err() {
             samples = [0.0; 64];
         }
         Block { index, origin, valid: grid.valid(origin), samples }
@@ -255,15 +271,20 @@ pub(crate) fn check_bits_per_block(bits: u32) -> Result<()> {
 fn check_exponents(bytes: &[u8], grid: &Grid, bits_per_block: u32, first_bit: u64) -> Result<u64> {
     let mut tiny = 0;
     for block in 0..grid.block_count() {
-        match biased_exponent(bytes, first_bit + block * u64::from(bits_per_block)) {
-            Some(exponent) if exponent > MAX_EXPONENT => {
-                return Err(Error::BlockExponent { block, voxel: grid.origin(block), exponent });
-            }
-            Some(exponent) if exponent <= TINY_EXPONENT => tiny += 1,
-            _ => {}
-        }
+        let bit = first_bit + block * u64::from(bits_per_block);
+        tiny += u64::from(check_exponent(bytes, grid, block, bit)?);
     }
     Ok(tiny)
+}
+
+/// Whether a block, which starts at `bit` of `bytes`, is tiny; refuses one that may overflow.
+pub(crate) fn check_exponent(bytes: &[u8], grid: &Grid, block: u64, bit: u64) -> Result<bool> {
+    match biased_exponent(bytes, bit) {
+        Some(exponent) if exponent > MAX_EXPONENT => {
+            Err(Error::BlockExponent { block, voxel: grid.origin(block), exponent })
+        }
+        exponent => Ok(exponent.is_some_and(|exponent| exponent <= TINY_EXPONENT)),
+    }
 }
 
 /// The biased exponent of the block that starts at `bit`; none for a block of zeros.

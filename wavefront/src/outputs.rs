@@ -143,14 +143,21 @@ impl OutputTextures {
     /// Allocates the textures asked for.
     pub fn new(device: &wgpu::Device, ledger: &Ledger, outputs: Outputs, size: [u32; 2]) -> Self {
         let mut pictures = Self { outputs, textures: Vec::new(), views: Vec::new() };
-        pictures.resize(device, ledger, size);
+        pictures.replace(device, ledger, outputs, size);
         pictures
     }
 
-    /// Replaces the textures by others of another size, without contents; the old ones go first.
-    pub fn resize(&mut self, device: &wgpu::Device, ledger: &Ledger, size: [u32; 2]) {
+    /// Replaces the textures by others, without contents; the old ones go first.
+    pub fn replace(
+        &mut self,
+        device: &wgpu::Device,
+        ledger: &Ledger,
+        outputs: Outputs,
+        size: [u32; 2],
+    ) {
         self.views.clear();
         self.textures.clear();
+        self.outputs = outputs;
         let textures = self.outputs.formats().map(|picture| picture.texture(device, ledger, size));
         self.textures.extend(textures);
         let view = |t: &Texture| t.create_view(&wgpu::TextureViewDescriptor::default());

@@ -103,6 +103,12 @@ pub(super) fn read_headerless(bytes: Arc<[u8]>, layout: &Headerless) -> Result<Z
     Ok(volume)
 }
 
+/// Dims, bits per block and first bit of a stream of the kind that the GPU decodes, from its start.
+pub(crate) fn fixed_rate_header(start: &[u8]) -> Option<([u32; 3], u32, u64)> {
+    let header = Header::parse(start).ok().filter(Header::is_kept)?;
+    Some((header.dims, header.config.max_bits(), header.bits))
+}
+
 /// What zfp's header says.
 struct Header {
     scalar_type: ZfpScalarType,
