@@ -41,6 +41,7 @@ impl Slots {
 
     /// Number of resident blocks, or what is wrong with one.
     fn check(&self, volume: &CompressedVolume) -> Result<usize, String> {
+        let stream = volume.read(0, u64::MAX);
         let mut resident = HashSet::new();
         for slot in 0..self.cache.slots() {
             let Some(block) = self.cache.owner(slot) else { continue };
@@ -50,7 +51,7 @@ impl Slots {
             if self.cache.lookup(block) != Some(slot) {
                 return Err(format!("block {block} is not found in slot {slot}"));
             }
-            let decoded = decode_block(volume.bytes(), volume.layout(), block.into());
+            let decoded = decode_block(&stream, volume.layout(), block.into());
             let held = &self.samples[64 * slot as usize..][..64];
             let differs = |i: &usize| held[*i].to_bits() != decoded[*i].to_bits();
             if let Some(i) = (0..64).find(differs) {
