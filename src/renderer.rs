@@ -543,6 +543,14 @@ impl ProgressiveIsoRenderer {
         &self.pictures.textures
     }
 
+    /// States of the current picture's rays, once the volume is loaded: for measuring.
+    pub fn rays(&self) -> Option<&wavefront::RayBuffers> {
+        match &self.phase {
+            Phase::Rendering(rendering) => Some(rendering.rays()),
+            _ => None,
+        }
+    }
+
     /// What the scene consists of.
     pub fn plan(&self) -> &ScenePlan {
         &self.plan

@@ -160,6 +160,11 @@ impl Rendering {
         });
     }
 
+    /// The rays' states.
+    pub(crate) fn rays(&self) -> &RayBuffers {
+        &self.rays
+    }
+
     /// Lists of active rays made before the first round.
     pub(crate) fn lists_at_start(&self) -> u32 {
         self.rounds.lists_at_start()
