@@ -1,4 +1,4 @@
-// The colour of every hole that has a candidate; finished pixels are not touched. With the network: its last
+// The colour of every hole: that of unfinished pixels where there is no candidate. Finished pixels are not touched. With the network: its last
 // convolution and its head. A workgroup for every tile with holes.
 #import features
 #import mix
@@ -76,11 +76,14 @@ fn fill(pixel: vec2<u32>, number: u32, inside: vec2<u32>) -> bool {
     let ray = frame_ray(frame, pixel).ray;
     let to_viewer = shading_to_viewer(ray.direction);
     let mixed = mix_candidates(features_candidates(pixel, ray, number), hints(inside), to_viewer);
+    var color = shading.unfinished;
     if (mixed.filled) {
         let coverage = select(mixed.coverage, step(0.5, mixed.coverage), params.crisp != 0u);
-        let color = vec4<f32>(shading_color(mixed.normal, to_viewer), 1.0);
-        textureStore(color_out, pixel, shading.background * (1.0 - coverage) + color * coverage);
+        let surface = vec4<f32>(shading_color(mixed.normal, to_viewer), 1.0);
+        color = shading.background * (1.0 - coverage) + surface * coverage;
     }
+    // An earlier pass may have filled the pixel with a candidate that has turned out to be wrong.
+    textureStore(color_out, pixel, color);
     return mixed.filled;
 }
 
