@@ -57,6 +57,11 @@ pub enum Error {
     /// Nothing to draw to.
     #[error("drawing was not planned: set RendererOptions::draw_target")]
     DrawNotPlanned,
+    /// [`crate::RendererOptions::infill`] does not have what a frame asks for.
+    #[error(
+        "this in-fill was not planned: set RendererOptions::infill, with weights for the network"
+    )]
+    InfillNotPlanned,
     /// No frame has been set.
     #[error("no frame has been set")]
     NoFrame,
@@ -112,6 +117,9 @@ pub enum Error {
     /// The block cache.
     #[error(transparent)]
     Cache(#[from] lru_cache_gpu::Error),
+    /// In-fill of unfinished pixels.
+    #[error(transparent)]
+    Infill(#[from] infill::Error),
     /// Rays, camera and pictures.
     #[error(transparent)]
     Wavefront(#[from] wavefront::Error),

@@ -23,7 +23,11 @@ pub use arriving::StreamFeed;
 pub use capture::{Capture, PendingCapture};
 pub use error::Error;
 pub use gpu_primitives::memory::Category;
-pub use options::{Frame, FrameOptions, RendererOptions, Residency, TraversalStrategy};
+pub use infill::{Sources as InfillSources, Weights as InfillWeights};
+pub use options::{
+    Completeness, Frame, FrameOptions, Infill, InfillOptions, RendererOptions, Residency,
+    TraversalStrategy,
+};
 pub use plan::{Part, ScenePlan, When, Work};
 pub use renderer::ProgressiveIsoRenderer;
 pub use report::PassReport;

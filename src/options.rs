@@ -1,5 +1,6 @@
 //! What a caller chooses.
 
+use infill::{Sources, Weights};
 use wavefront::{Camera, DrawTarget, Outputs, Shading};
 
 /// How rays find the surface. All strategies make the same picture, bit for bit.
@@ -29,6 +30,32 @@ pub enum Residency {
     Full,
 }
 
+/// What filling unfinished pixels may use, for the life of a renderer.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct InfillOptions {
+    /// Where guesses come from.
+    pub sources: Sources,
+    /// Weights of the network, for [`Infill::Network`].
+    pub network: Option<&'static Weights>,
+}
+
+/// What shows where a pixel is unfinished.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Infill {
+    /// [`Shading::unfinished`].
+    #[default]
+    Off,
+    /// A guess: the sources' average.
+    Classical,
+    /// A guess: the sources in shares that the network gives them.
+    Network,
+}
+
+/// Finished share of the rays that enter the volume, 0 to 1.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+pub struct Completeness(pub f32);
+
 /// Choices that hold for the life of a renderer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RendererOptions {
@@ -40,6 +67,8 @@ pub struct RendererOptions {
     pub outputs: Outputs,
     /// The caller's targets for [`crate::ProgressiveIsoRenderer::draw`]; adds the depth output.
     pub draw_target: Option<DrawTarget>,
+    /// What filling unfinished pixels needs, and adds the outputs depth and normal; `None`: they are never filled.
+    pub infill: Option<InfillOptions>,
     /// Whether pictures will be read back with [`crate::ProgressiveIsoRenderer::capture`].
     pub capture: bool,
     /// How rays find the surface.
@@ -59,6 +88,7 @@ impl Default for RendererOptions {
             budget_bytes: 256 << 20,
             outputs: Outputs::default(),
             draw_target: None,
+            infill: None,
             capture: false,
             strategy: TraversalStrategy::RunAhead,
             residency: Residency::Auto,
@@ -70,8 +100,9 @@ impl Default for RendererOptions {
 impl RendererOptions {
     /// The outputs, with those that other choices need.
     pub(crate) fn all_outputs(&self) -> Outputs {
-        let depth = self.outputs.depth || self.draw_target.is_some();
-        Outputs { depth, ..self.outputs }
+        let infill = self.infill.is_some();
+        let depth = self.outputs.depth || self.draw_target.is_some() || infill;
+        Outputs { depth, normal: self.outputs.normal || infill, ..self.outputs }
     }
 
     /// What pictures there are and where they go.
@@ -107,10 +138,26 @@ pub struct FrameOptions {
     /// round in which the ray stops again, up to 64, and is larger from the start where the cache holds the last
     /// frame's blocks. 1 means no look-ahead at all. More need fewer passes and decode more.
     pub look_ahead: u32,
+    /// What unfinished pixels show after every pass; needs [`RendererOptions::infill`]. They stay unfinished in
+    /// status, depth and normals, and passes go on replacing them by exact ones.
+    pub infill: Infill,
+    /// Whether filled pixels show either surface or background; else their colour is a mixture of both.
+    pub crisp_infill: bool,
+    /// Completeness that is enough: from then on reports are [`crate::PassReport::stopped`] and pixels are filled,
+    /// not before. Passes that are called for all the same go on. `None`: pixels are filled after every pass.
+    pub stop_at: Option<Completeness>,
 }
 
 impl Default for FrameOptions {
     fn default() -> Self {
-        Self { shading: Shading::default(), rounds_per_pass: 8, pass_ms: 30.0, look_ahead: 2 }
+        Self {
+            shading: Shading::default(),
+            rounds_per_pass: 8,
+            pass_ms: 30.0,
+            look_ahead: 2,
+            infill: Infill::Off,
+            crisp_infill: false,
+            stop_at: None,
+        }
     }
 }

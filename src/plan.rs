@@ -4,13 +4,14 @@ use std::fmt;
 
 use gpu_primitives::memory::Ledger;
 use gpu_primitives::readback::ReadbackRing;
+use infill::InfillPlan;
 use lru_cache_gpu::{CachePlan, CacheRoom, ResidentPlan};
 use macrocell::{MacrocellPlan, Masks, RangeScratch};
 use wavefront::{DrawBuffers, WavefrontPlan};
 use zfp_gpu::{DecodeBuffers, ExtremaBuffers, PayloadPlan, StreamLayout};
 
 use crate::load::{BLOCKS_PER_REGION, LoadPlan};
-use crate::records::{CONTROL_BYTES, PASSES_IN_FLIGHT, READBACK_BYTES};
+use crate::records::{CONTROL_BYTES, PASSES_IN_FLIGHT, readback_bytes};
 use crate::samples::SamplePlan;
 use crate::schedule::FIRST_CELLS;
 use crate::strategy::StrategyPlan;
@@ -72,6 +73,7 @@ pub struct ScenePlan {
     pub(crate) samples: SamplePlan,
     pub(crate) wavefront: WavefrontPlan,
     pub(crate) strategy: StrategyPlan,
+    pub(crate) infill: Option<InfillPlan>,
     parts: Vec<Part>,
     budget_bytes: u64,
 }
@@ -115,7 +117,15 @@ impl ScenePlan {
         let outputs = options.all_outputs();
         let wavefront = WavefrontPlan::new(options.size, outputs, limits)?;
         let strategy = StrategyPlan::new(options.strategy, wavefront.rays(), limits)?;
-        let scene = Scene { options, limits, payload, macrocell, load, wavefront, strategy };
+        let infill = options
+            .infill
+            .map(|infill| {
+                let network = infill.network.is_some();
+                InfillPlan::new(options.size, infill.sources, network, &macrocell, limits)
+            })
+            .transpose()?;
+        let scene =
+            Scene { options, limits, payload, macrocell, load, wavefront, strategy, infill };
         match options.residency {
             Residency::Cached => scene.cached(),
             Residency::Full => scene.resident(),
@@ -233,6 +243,7 @@ struct Scene<'a> {
     load: Option<LoadPlan>,
     wavefront: WavefrontPlan,
     strategy: StrategyPlan,
+    infill: Option<InfillPlan>,
 }
 
 impl Scene<'_> {
@@ -317,6 +328,7 @@ impl Scene<'_> {
             samples,
             wavefront: self.wavefront.clone(),
             strategy: self.strategy,
+            infill: self.infill.clone(),
             parts,
             budget_bytes: self.options.budget_bytes,
         }
@@ -326,8 +338,9 @@ impl Scene<'_> {
     fn parts(&self) -> Vec<Part> {
         let mut parts = Vec::from(self.volume_parts());
         parts.extend(self.picture_parts());
-        let readback = ReadbackRing::new(&Ledger::new(), "plan", READBACK_BYTES, PASSES_IN_FLIGHT)
-            .bytes_limit();
+        let bytes = readback_bytes(self.infill.is_some());
+        let readback =
+            ReadbackRing::new(&Ledger::new(), "plan", bytes, PASSES_IN_FLIGHT).bytes_limit();
         parts.extend([
             Part::new("parameters", When::Always, PARAMS_STAGING, "staging"),
             Part::new("readback", When::Always, readback + CONTROL_BYTES, "counters of two passes"),
@@ -359,7 +372,7 @@ impl Scene<'_> {
         ]
     }
 
-    fn picture_parts(&self) -> [Part; 4] {
+    fn picture_parts(&self) -> [Part; 5] {
         let Self { options, wavefront, .. } = self;
         [
             Part::new("pictures", When::Always, wavefront.output_bytes(), picture_names(wavefront)),
@@ -375,6 +388,12 @@ impl Scene<'_> {
                 Part::left_out("capture", "not asked for")
             },
             Part::new("rays", When::Rendering, wavefront.ray_bytes(), "states and active lists"),
+            match &self.infill {
+                Some(plan) => {
+                    Part::new("infill", When::Rendering, plan.bytes(), infill_names(plan))
+                }
+                None => Part::left_out("infill", "not asked for"),
+            },
         ]
     }
 }
@@ -450,6 +469,16 @@ fn picture_names(wavefront: &WavefrontPlan) -> String {
     names.extend(outputs.depth.then_some("depth"));
     names.extend(outputs.normal.then_some("normal"));
     names.extend(outputs.status.then_some("status"));
+    names.join(", ")
+}
+
+fn infill_names(plan: &InfillPlan) -> String {
+    let sources = plan.sources();
+    let mut names = Vec::new();
+    names.extend(sources.neighbours.then_some("neighbours"));
+    names.extend(sources.coarse_field.then_some("coarse field"));
+    names.extend(sources.history.then_some("history"));
+    names.extend(plan.network().then_some("network"));
     names.join(", ")
 }
 

@@ -28,8 +28,14 @@ struct PassRecord {
     statistics: Statistics,
 }
 
-/// Bytes of a [`PassRecord`].
-pub(crate) const READBACK_BYTES: u64 = size_of::<PassRecord>() as u64 + PROFILE_BYTES;
+/// Bytes of the number of filled pixels.
+const FILLED_BYTES: u64 = size_of::<u32>() as u64;
+
+/// Bytes that are read back after a pass: a [`PassRecord`] and, with in-fill, the number of filled pixels.
+pub(crate) fn readback_bytes(infill: bool) -> u64 {
+    let filled = if infill { FILLED_BYTES } else { 0 };
+    size_of::<PassRecord>() as u64 + filled + PROFILE_BYTES
+}
 
 /// Bytes of the timestamps that are read back with a pass, and of the buffer that they come from.
 #[cfg(feature = "wgpu-profiler")]
@@ -55,6 +61,8 @@ pub(crate) struct PassInfo {
     /// Cells that its walks may visit each, and the time that the pass should take.
     pub(crate) most_cells: u32,
     pub(crate) pass_ms: f32,
+    /// Share of the rays that enter the volume that is enough.
+    pub(crate) stop_at: Option<f32>,
     pub(crate) dispatches: u32,
     /// When recording began.
     pub(crate) begin: Instant,
@@ -68,6 +76,8 @@ struct Submitted {
     info: PassInfo,
     /// Bytes of the pass's [`PassRecord`] in what is read back.
     record_bytes: usize,
+    /// Bytes of the number of filled pixels behind it; 0 where there is none.
+    filled_bytes: usize,
 }
 
 /// The passes in flight and the newest report.
@@ -88,10 +98,15 @@ pub(crate) struct PassRecords {
 }
 
 impl PassRecords {
-    pub(crate) fn new(device: &wgpu::Device, queue: &wgpu::Queue, ledger: &Ledger) -> Self {
-        let label = "progressive-iso.readback";
+    pub(crate) fn new(
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        ledger: &Ledger,
+        infill: bool,
+    ) -> Self {
+        let (label, bytes) = ("progressive-iso.readback", readback_bytes(infill));
         Self {
-            readback: ReadbackRing::new(ledger, label, READBACK_BYTES, PASSES_IN_FLIGHT),
+            readback: ReadbackRing::new(ledger, label, bytes, PASSES_IN_FLIGHT),
             timer: Timer::new(device, queue, ledger),
             #[cfg(feature = "wgpu-profiler")]
             profile: crate::timing::Profile::new(device, queue, ledger),
@@ -139,22 +154,25 @@ impl PassRecords {
     }
 
     /// Records reading a pass's counters back: parts (buffer, byte offset, bytes) in the order of a
-    /// [`PassRecord`]'s fields.
+    /// [`PassRecord`]'s fields; then, if pixels were filled, their number.
     pub(crate) fn record_readback(
         &mut self,
         device: &wgpu::Device,
         encoder: &mut wgpu::CommandEncoder,
         counters: &[(&wgpu::Buffer, u64, u64)],
+        filled: Option<(&wgpu::Buffer, u64, u64)>,
         info: PassInfo,
     ) {
         let mut parts = vec![self.timer.part()];
         parts.extend(counters);
         let record_bytes = parts.iter().map(|part| part.2 as usize).sum();
+        let filled_bytes = filled.map_or(0, |part| part.2 as usize);
+        parts.extend(filled);
         let tag = self.submitted.last().map_or(1, |s| s.tag + 1);
         #[cfg(feature = "wgpu-profiler")]
         parts.extend(self.profile.part());
         if self.readback.record(device, encoder, &parts, tag) {
-            self.submitted.push(Submitted { tag, info, record_bytes });
+            self.submitted.push(Submitted { tag, info, record_bytes, filled_bytes });
         }
     }
 
@@ -179,14 +197,16 @@ impl PassRecords {
         let mut record = PassRecord::zeroed();
         let length = submitted.record_bytes.min(bytes.len()).min(size_of::<PassRecord>());
         bytemuck::bytes_of_mut(&mut record)[..length].copy_from_slice(&bytes[..length]);
+        let (filled, _profile) = bytes[length..].split_at(submitted.filled_bytes);
         #[cfg(feature = "wgpu-profiler")]
-        self.profile.take(&bytes[length..]);
+        self.profile.take(_profile);
+        let filled = filled.try_into().map_or(0, u32::from_le_bytes);
         let info = submitted.info;
         if info.pass > 0 && record.rays.lists == 0 {
             // The start of a frame lists its rays: no shader has run.
             self.lost = self.lost.or(Some(Lost::NotRun));
         } else if info.pass > 0 && info.frame > self.broken_frame {
-            self.take(info, &record);
+            self.take(info, &record, filled);
         }
     }
 
@@ -217,7 +237,7 @@ impl PassRecords {
         }
     }
 
-    fn take(&mut self, info: PassInfo, record: &PassRecord) {
+    fn take(&mut self, info: PassInfo, record: &PassRecord, filled: u32) {
         let gpu_ms = self.timer.milliseconds(record.ticks);
         let rounds = record.rays.lists.saturating_sub(info.lists_at_start);
         self.take_time(info, rounds, record.rays.cut, gpu_ms);
@@ -237,6 +257,11 @@ impl PassRecords {
         report.cut_walks = record.rays.cut;
         report.hits = record.rays.hits;
         report.open_depth_voxels = record.rays.open_depth_voxels();
+        report.filled_pixels = filled;
+        // As `gate.wgsl` of in-fill decides it.
+        let entered = record.rays.entered;
+        let finished = (entered - record.rays.active.min(entered)) as f32;
+        report.stopped = info.stop_at.is_some_and(|share| finished >= share * entered as f32);
         report.blocks_used = since(record.cache.used, record.cache_before.used);
         report.blocks_requested = since(record.cache.requested, record.cache_before.requested);
         report.blocks_decoded = since(record.cache.decoded, record.cache_before.decoded);

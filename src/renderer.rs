@@ -6,6 +6,7 @@ mod slots_tests;
 use gpu_primitives::kernel::dispatches_recorded;
 use gpu_primitives::memory::{Category, Ledger};
 use gpu_primitives::upload::UploadRing;
+use infill::Method;
 use wavefront::{FrameView, LookAhead, OutputTextures, ShadingParams};
 use web_time::Instant;
 
@@ -17,7 +18,7 @@ use crate::records::{PassInfo, PassRecords};
 use crate::samples::SampleBuffers;
 use crate::stages::{Pictures, Rendering, Stages, VolumeBuffers};
 use crate::{
-    CompressedVolume, Error, Frame, PassReport, RendererOptions, Residency, ScenePlan, wgpu,
+    CompressedVolume, Error, Frame, Infill, PassReport, RendererOptions, Residency, ScenePlan, wgpu,
 };
 
 /// Largest size of an isovalue or a sample.
@@ -54,6 +55,8 @@ pub struct ProgressiveIsoRenderer {
     frame: Option<FrameState>,
     frame_count: u64,
     active_isovalue: Option<f32>,
+    /// Isovalue of the hits that the pictures show, if they show those of the newest frame that started.
+    shown_isovalue: Option<f32>,
     clear_cache: bool,
 }
 
@@ -108,12 +111,13 @@ impl ProgressiveIsoRenderer {
         let (stages, load_stages) = faults.guard(device, Task::Pipelines, || {
             Ok((Stages::new(device, &plan, &options)?, LoadStages::new(device, &plan)?))
         })?;
+        let infill = options.infill.is_some();
         let upload = UploadRing::new(&ledger, "progressive-iso.upload", PARAMS_CHUNK);
         let (buffers, pictures, loader, records) = faults.guard(device, Task::Other, || {
             let buffers = VolumeBuffers::new(device, &ledger, &stages, &plan);
             let pictures = Pictures::new(device, &ledger, &stages, &plan);
             let loader = Loader::new(device, &ledger, &plan, &buffers, load_stages)?;
-            Ok((buffers, pictures, loader, PassRecords::new(device, queue, &ledger)))
+            Ok((buffers, pictures, loader, PassRecords::new(device, queue, &ledger, infill)))
         })?;
         Ok(Self {
             faults,
@@ -131,6 +135,7 @@ impl ProgressiveIsoRenderer {
             frame: None,
             frame_count: 0,
             active_isovalue: None,
+            shown_isovalue: None,
             clear_cache: false,
         })
     }
@@ -145,6 +150,15 @@ impl ProgressiveIsoRenderer {
         };
         if !isovalue.is_finite() || isovalue.abs() > LARGEST_VALUE {
             return Err(Error::Isovalue { found: isovalue });
+        }
+        let planned = self.plan.infill.as_ref();
+        let possible = match frame.options.infill {
+            Infill::Off => true,
+            Infill::Classical => planned.is_some(),
+            Infill::Network => planned.is_some_and(|plan| plan.network()),
+        };
+        if !possible {
+            return Err(Error::InfillNotPlanned);
         }
         let view = self.view(frame)?;
         self.frame_count += 1;
@@ -253,6 +267,7 @@ impl ProgressiveIsoRenderer {
     /// Starts the current frame again as if nothing had been recorded for it.
     fn start_again(&mut self) {
         self.active_isovalue = None;
+        self.shown_isovalue = None;
         if let Some(state) = &mut self.frame {
             self.clear_cache |= state.clears_cache;
             self.frame_count += 1;
@@ -352,6 +367,11 @@ impl ProgressiveIsoRenderer {
                 tracing::debug_span!("progressive_iso.round", round = state.rounds).entered();
             rendering.record_round(encoder, &self.stages);
         }
+        match options.infill {
+            Infill::Off => {}
+            Infill::Classical => rendering.record_fill(encoder, &self.stages, Method::Classical),
+            Infill::Network => rendering.record_fill(encoder, &self.stages, Method::Network),
+        }
     }
 
     /// Records the start of the current frame unless it has started.
@@ -383,6 +403,16 @@ impl ProgressiveIsoRenderer {
         let params =
             state.view.params(grid, lru, isovalue, look_ahead).with_most_cells(state.most_cells);
         let shading = ShadingParams::new(&frame.options.shading, self.volume.world_from_index);
+        let next = (&state.view, &params);
+        if frame.options.infill != Infill::Off {
+            let follows = self.shown_isovalue == Some(isovalue);
+            let look = infill::Look {
+                from_completeness: frame.options.stop_at.map_or(0.0, |stop| stop.0),
+                crisp: frame.options.crisp_infill,
+            };
+            rendering.record_infill_start(device, encoder, upload, stages, next, follows, look);
+        }
+        self.shown_isovalue = Some(isovalue);
         rendering.record_start(device, encoder, upload, stages, &params, &shading);
         if let (Some(draw), Some(buffers)) = (&stages.draw, &self.pictures.draw) {
             draw.record_params(device, encoder, upload, buffers, &state.view);
@@ -397,14 +427,18 @@ impl ProgressiveIsoRenderer {
         begin: Instant,
         dispatches: u32,
     ) {
-        let (counters, lists_at_start) = match &self.phase {
-            Phase::Rendering(rendering) => (rendering.counters(), rendering.lists_at_start()),
-            _ => (Vec::new(), 0),
+        let (counters, filled, lists_at_start) = match &self.phase {
+            Phase::Rendering(rendering) => {
+                (rendering.counters(), rendering.filled(), rendering.lists_at_start())
+            }
+            _ => (Vec::new(), None, 0),
         };
         let state = self.frame.as_ref().filter(|state| state.started);
         let (frame, pass, rounds) = state.map_or((0, 0, 0), |s| (s.number, s.passes, s.rounds));
         let most_cells = state.map_or(0, |state| state.most_cells);
         let pass_ms = state.map_or(0.0, |state| state.frame.options.pass_ms);
+        let stop_at = state.and_then(|state| state.frame.options.stop_at).map(|stop| stop.0);
+        let fills = state.is_some_and(|state| state.frame.options.infill != Infill::Off);
         let [width, height] = self.options.size;
         let cpu_ms = begin.elapsed().as_secs_f64() * 1e3;
         let pixels = width * height;
@@ -416,11 +450,13 @@ impl ProgressiveIsoRenderer {
             pixels,
             most_cells,
             pass_ms,
+            stop_at,
             dispatches,
             begin,
             cpu_ms,
         };
-        self.records.record_readback(device, encoder, &counters, info);
+        let filled = filled.filter(|_| fills);
+        self.records.record_readback(device, encoder, &counters, filled, info);
     }
 
     pub(crate) fn report(&self, submitted: bool) -> PassReport {
@@ -545,6 +581,7 @@ impl ProgressiveIsoRenderer {
 
     /// Frees the memory of the rays and, unless they are kept, of the samples.
     fn release_rays(&mut self, keep_samples: bool) {
+        self.shown_isovalue = None;
         let samples = match std::mem::replace(&mut self.phase, Phase::Loaded(None)) {
             Phase::Loading(loader) => {
                 self.phase = Phase::Loading(loader);
@@ -564,6 +601,14 @@ impl ProgressiveIsoRenderer {
     /// The pictures' textures.
     pub fn textures(&self) -> &OutputTextures {
         &self.pictures.textures
+    }
+
+    /// States of the current picture's rays, once the volume is loaded: for measuring.
+    pub fn rays(&self) -> Option<&wavefront::RayBuffers> {
+        match &self.phase {
+            Phase::Rendering(rendering) => Some(rendering.rays()),
+            _ => None,
+        }
     }
 
     /// What the scene consists of.

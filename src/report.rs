@@ -35,6 +35,10 @@ pub struct PassReport {
     /// have started) and is 0 when the frame is complete. Computed in f32 from the numbers that the rays
     /// themselves use; of finished pixels it says nothing, since they do not change any more.
     pub open_depth_voxels: f32,
+    /// Unfinished pixels that show a guess: see [`crate::Infill`].
+    pub filled_pixels: u32,
+    /// Whether the frame is as complete as [`crate::FrameOptions::stop_at`] asks for.
+    pub(crate) stopped: bool,
     /// Resident blocks that rays used in this frame, once per round each. With `blocks_requested`,
     /// the growth from pass to pass is the number of blocks that a pass needs (the published
     /// "active blocks", neighbours included).
@@ -91,6 +95,19 @@ impl PassReport {
         } else {
             1.0 - f64::from(self.active_rays) / f64::from(of)
         }
+    }
+
+    /// Pixels that are final.
+    #[must_use]
+    pub fn exact_pixels(&self) -> u32 {
+        self.rays - self.active_rays
+    }
+
+    /// Whether the newest frame is as complete as [`crate::FrameOptions::stop_at`] asks for, so that the caller may
+    /// call for no more passes.
+    #[must_use]
+    pub fn stopped(&self) -> bool {
+        self.pass > 0 && self.frame == self.newest_frame && self.stopped
     }
 
     /// Whether the newest frame is finished: every pixel is final.

@@ -2,10 +2,11 @@
 
 use gpu_primitives::memory::Ledger;
 use gpu_primitives::upload::UploadRing;
+use infill::{InfillBuffers, Method, Weights};
 use macrocell::{Activate, Masks, RangeBuffers};
 use wavefront::{
-    Draw, DrawBuffers, FrameParams, OutputTextures, RayBuffers, Rays, Rounds, Scene, ShadingParams,
-    Strategy,
+    Draw, DrawBuffers, FrameParams, FrameView, OutputTextures, RayBuffers, Rays, Rounds, Scene,
+    ShadingParams, Strategy,
 };
 use zfp_gpu::Payload;
 
@@ -20,6 +21,14 @@ pub(crate) struct Stages {
     pub(crate) rays: Rays,
     pub(crate) strategy: Box<dyn Strategy>,
     pub(crate) draw: Option<Draw>,
+    pub(crate) infill: Option<InfillStage>,
+}
+
+/// Pipelines and weights of in-fill.
+#[derive(Debug)]
+pub(crate) struct InfillStage {
+    pub(crate) stage: infill::Infill,
+    weights: Option<&'static Weights>,
 }
 
 /// The volume as it is needed all the time.
@@ -43,6 +52,7 @@ pub(crate) struct Rendering {
     pub(crate) samples: SampleBuffers,
     rays: RayBuffers,
     rounds: Box<dyn Rounds>,
+    infill: Option<InfillBuffers>,
 }
 
 impl Stages {
@@ -59,6 +69,10 @@ impl Stages {
             rays: Rays::new(device, plan.wavefront.outputs(), layout),
             strategy: plan.strategy.pipelines(device, layout),
             draw: options.draw_target.map(|target| Draw::new(device, &target)),
+            infill: plan.infill.as_ref().map(|plan| InfillStage {
+                stage: infill::Infill::new(device, plan),
+                weights: options.infill.and_then(|infill| infill.network),
+            }),
         })
     }
 }
@@ -137,7 +151,11 @@ impl Rendering {
         let rays = RayBuffers::new(device, ledger, &stages.rays, wavefront, masks, read, textures);
         let scene = Scene { rays: &rays, masks, samples: read };
         let rounds = stages.strategy.bind(device, ledger, scene)?;
-        Ok(Self { samples, rays, rounds })
+        let scene = infill::Scene { rays: &rays, ranges: &volume.ranges, textures };
+        let infill = stages.infill.as_ref().map(|InfillStage { stage, weights }| {
+            InfillBuffers::new(device, ledger, stage, scene, *weights)
+        });
+        Ok(Self { infill: infill.transpose()?, samples, rays, rounds })
     }
 
     /// Records the first rays of a frame.
@@ -154,11 +172,49 @@ impl Rendering {
         self.rounds.record_start(encoder, &stages.rays, &self.rays);
     }
 
+    /// Records what in-fill keeps of the previous frame: before the new one starts.
+    pub(crate) fn record_infill_start(
+        &self,
+        device: &wgpu::Device,
+        encoder: &mut wgpu::CommandEncoder,
+        upload: &mut UploadRing,
+        stages: &Stages,
+        next: (&FrameView, &FrameParams),
+        follows: bool,
+        look: infill::Look,
+    ) {
+        if let (Some(InfillStage { stage, .. }), Some(buffers)) = (&stages.infill, &self.infill) {
+            stage.record_start(device, encoder, upload, buffers, next, follows, look);
+        }
+    }
+
+    /// Records filling the unfinished pixels.
+    pub(crate) fn record_fill(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        stages: &Stages,
+        method: Method,
+    ) {
+        if let (Some(InfillStage { stage, .. }), Some(buffers)) = (&stages.infill, &self.infill) {
+            stage.record_fill(encoder, buffers, method);
+        }
+    }
+
+    /// Where the number of filled pixels is after a fill.
+    pub(crate) fn filled(&self) -> Option<(&wgpu::Buffer, u64, u64)> {
+        self.infill.as_ref().map(InfillBuffers::filled)
+    }
+
     /// Records one round.
     pub(crate) fn record_round(&self, encoder: &mut wgpu::CommandEncoder, stages: &Stages) {
         self.rounds.record_round(encoder, &stages.rays, &self.rays, &mut |encoder| {
             self.samples.record_service(encoder, &stages.samples);
         });
+    }
+
+    /// The rays' states.
+    pub(crate) fn rays(&self) -> &RayBuffers {
+        &self.rays
     }
 
     /// Lists of active rays made before the first round.

@@ -134,6 +134,26 @@ pub fn read_texture(gpu: &Gpu, texture: &wgpu::Texture) -> Result<Vec<u8>, Failu
     Ok(rows.flat_map(|padded| &padded[..row as usize]).copied().collect())
 }
 
+/// Reads a buffer that has the usage `COPY_SRC` back as words, blocking on the device.
+pub fn read_words(gpu: &Gpu, source: &wgpu::Buffer) -> Result<Vec<u32>, Failure> {
+    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("example.read_words"),
+        size: source.size(),
+        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    encoder.copy_buffer_to_buffer(source, 0, &buffer, 0, source.size());
+    encoder.map_buffer_on_submit(&buffer, wgpu::MapMode::Read, .., |_| {});
+    #[expect(clippy::disallowed_methods, reason = "the program owns the queue")]
+    gpu.queue.submit([encoder.finish()]);
+    #[expect(clippy::disallowed_methods, reason = "the program may block")]
+    gpu.device.poll(wgpu::PollType::wait_indefinitely())?;
+    let view = buffer.get_mapped_range(..)?;
+    let word = |b: &[u8]| u32::from_le_bytes([b[0], b[1], b[2], b[3]]);
+    Ok(view.chunks_exact(4).map(word).collect())
+}
+
 /// Resident memory of this process in bytes, now and at its peak; `None` where the system does not
 /// say.
 pub fn resident_bytes() -> Option<[u64; 2]> {

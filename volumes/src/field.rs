@@ -2,8 +2,8 @@
 
 use crate::math::{Jet, Real};
 use crate::{
-    Gyroid, MarschnerLobb, MixingLayer, Patch, PlaneRamp, RoughSolid, Shells, SphereDistance,
-    Turbulence,
+    Blobs, Gyroid, Labels, MarschnerLobb, MixingLayer, Patch, PlaneRamp, RoughSolid, Sheets,
+    Shells, SphereDistance, Tubes, Turbulence,
 };
 
 /// A scalar field over the index space of a volume: voxel (i, j, k) is the position `[i, j, k]`.
@@ -57,6 +57,10 @@ pub const NAMES: &[&str] = &[
     "rough-solid",
     "patch",
     "mixing-layer",
+    "blobs",
+    "sheets",
+    "tubes",
+    "labels",
 ];
 
 /// No generator has this name.
@@ -72,16 +76,32 @@ pub struct UnknownField {
 /// # Errors
 /// [`UnknownField`] unless `name` is one of [`NAMES`].
 pub fn by_name(name: &str, dims: [u32; 3]) -> Result<Box<dyn Field>, UnknownField> {
+    by_name_with_seed(name, dims, 1)
+}
+
+/// As [`by_name`] with another seed of the noise, for fields that have noise.
+///
+/// # Errors
+/// As [`by_name`].
+pub fn by_name_with_seed(
+    name: &str,
+    dims: [u32; 3],
+    seed: u32,
+) -> Result<Box<dyn Field>, UnknownField> {
     Ok(match name {
         "sphere" => Box::new(SphereDistance::new(dims)),
         "plane" => Box::new(PlaneRamp::new(dims)),
         "marschner-lobb" => Box::new(MarschnerLobb::new(dims)),
         "gyroid" => Box::new(Gyroid::new(dims)),
-        "shells" => Box::new(Shells::new(dims)),
-        "turbulence" => Box::new(Turbulence::new(dims)),
-        "rough-solid" => Box::new(RoughSolid::new(dims)),
+        "shells" => Box::new(Shells::with_seed(dims, seed)),
+        "turbulence" => Box::new(Turbulence::with_seed(dims, seed)),
+        "rough-solid" => Box::new(RoughSolid::with_seed(dims, seed)),
         "patch" => Box::new(Patch::new(dims)),
-        "mixing-layer" => Box::new(MixingLayer::new(dims)),
+        "mixing-layer" => Box::new(MixingLayer::with_seed(dims, seed)),
+        "blobs" => Box::new(Blobs::with_seed(dims, seed)),
+        "sheets" => Box::new(Sheets::with_seed(dims, seed)),
+        "tubes" => Box::new(Tubes::with_seed(dims, seed)),
+        "labels" => Box::new(Labels::with_seed(dims, seed)),
         _ => return Err(UnknownField { name: name.to_owned() }),
     })
 }

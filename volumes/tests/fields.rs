@@ -2,8 +2,8 @@
 
 use proptest::prelude::*;
 use volumes::{
-    Field, Gyroid, MarschnerLobb, MixingLayer, NAMES, Patch, PlaneRamp, RoughSolid, Shells,
-    SphereDistance, Turbulence, by_name, samples,
+    Field, Gyroid, MarschnerLobb, MixingLayer, NAMES, Patch, PlaneRamp, Rotated, RoughSolid,
+    Shells, SphereDistance, Turbulence, by_name, samples,
 };
 
 const DIMS: [u32; 3] = [48, 40, 56];
@@ -35,6 +35,15 @@ fn inside() -> impl Strategy<Value = [f64; 3]> {
 }
 
 proptest! {
+    #[test]
+    fn a_turned_field_turns_its_gradient(p in inside(), angle in 0.0..6.3_f64) {
+        let (s, c) = angle.sin_cos();
+        let rows = [[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]];
+        let field = Rotated::new(by_name("turbulence", DIMS).unwrap(), DIMS, rows);
+        let gradient = field.gradient(p).unwrap();
+        prop_assert!(gradient_error(&field, p, gradient) < 1e-5);
+    }
+
     #[test]
     fn gradients_match_central_differences(p in inside(), which in 0..NAMES.len()) {
         let field = by_name(NAMES[which], DIMS).unwrap();
@@ -277,7 +286,7 @@ fn samples_have_the_same_bits_on_every_platform() {
     assert_eq!(found, CHECKSUMS);
 }
 
-const CHECKSUMS: [(&str, u64); 9] = [
+const CHECKSUMS: [(&str, u64); 13] = [
     ("sphere", 0xf387_3c9f_0460_08c5),
     ("plane", 0x4712_0522_6624_8437),
     ("marschner-lobb", 0xc95b_6947_d5fb_ef6d),
@@ -287,4 +296,8 @@ const CHECKSUMS: [(&str, u64); 9] = [
     ("rough-solid", 0xf6a1_73e7_58f7_150a),
     ("patch", 0x9c8b_ed88_4b1e_a719),
     ("mixing-layer", 0xbcca_73d8_9cc3_2896),
+    ("blobs", 0xac15_3fac_87f9_de36),
+    ("sheets", 0x9732_199b_fe8b_6a5c),
+    ("tubes", 0x295a_d636_66ac_5a6a),
+    ("labels", 0x46b1_aae8_5dff_7cd8),
 ];

@@ -75,12 +75,10 @@ fn resolve(id: u32, state: u32) {
     let low = cell_entry(ray, walk.place.event, walk.place.cell);
     let high = cell_exit(ray, walk.exit, walk.place.cell);
     let gradient = cell_gradient(walk.corners, low * (1.0 - s) + high * s);
-    let along = ray.direction.x * shading.world_x + ray.direction.y * shading.world_y
-        + ray.direction.z * shading.world_z;
-    let to_viewer = -outputs_safe_normalize(along, vec3<f32>(0.0, 0.0, 1.0));
-    let normal = outputs_normal(gradient, to_viewer);
+    let to_viewer = shading_to_viewer(ray.direction);
+    let normal = shading_normal(gradient, to_viewer);
     let depth = frame.start_depth + t * frame_ray.depth_per_voxel;
-    outputs_write_hit(pixel, outputs_shade(normal, to_viewer), depth, normal);
+    outputs_write_hit(pixel, shading_color(normal, to_viewer), depth, normal);
 }
 
 // Length of the ray's part in which its first hit may still lie, in voxels: from where it enters the block that it

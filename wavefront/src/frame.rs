@@ -75,6 +75,21 @@ impl FrameParams {
     /// Most that a bound on the cells of a walk may be: so a count of cells stays far below 2^32.
     pub const MOST_CELLS: u32 = 1 << 31;
 
+    /// Bytes of the uniform.
+    pub const BYTES: u64 = PARAMS_BYTES;
+
+    /// Width and height of the picture in pixels.
+    #[must_use]
+    pub fn size(&self) -> [u32; 2] {
+        [self.width, self.height]
+    }
+
+    /// The frame's isovalue.
+    #[must_use]
+    pub fn isovalue(&self) -> f32 {
+        self.isovalue
+    }
+
     /// Cells that one walk of all listed rays visits at most, [`Self::MOST_CELLS`] if nothing else is said. A
     /// ray visits one block at least in a round, so less than 10 per listed ray count as 10.
     #[must_use]
@@ -109,6 +124,7 @@ pub struct FrameView {
     direction: [DVec3; 3],
     /// View depth at which the rays start, in world units.
     start_depth: f64,
+    view_from_index: DMat4,
     clip_from_view: DMat4,
     /// View-space x and y at view depth d: base + d * slope, each affine in clip-space x and y.
     base: [DVec3; 3],
@@ -157,6 +173,7 @@ impl FrameView {
             origin: per_pixel([start(0), start(1), start(2)]),
             direction: per_pixel([along(0), along(1), along(2)]),
             start_depth,
+            view_from_index,
             clip_from_view,
             base,
             slope,
@@ -216,6 +233,17 @@ impl FrameView {
     /// View depth at which the rays start, in world units.
     pub fn start_depth(&self) -> f64 {
         self.start_depth
+    }
+
+    /// Rows that take an index-space position (x, y, z, 1) to (column * w, row * w, w, view depth): its place in
+    /// the picture in pixels, whose centres lie at halves.
+    pub fn pixel_from_index(&self) -> [[f32; 4]; 4] {
+        let clip = (self.clip_from_view * self.view_from_index).transpose();
+        let [width, height] = self.size.map(f64::from);
+        let column = (clip.x_axis + clip.w_axis) * (0.5 * width);
+        let row = (clip.w_axis - clip.y_axis) * (0.5 * height);
+        let depth = -self.view_from_index.row(2);
+        [column, row, clip.w_axis, depth].map(|v| v.as_vec4().to_array())
     }
 
     /// Clip-space z and w for a pixel at view depth d: (z0 + d z1, w0 + d w1), each row affine in
@@ -304,4 +332,29 @@ fn near_depth(clip_from_view: DMat4) -> f64 {
         .filter(|d| d.is_finite() && (!perspective || *d > 0.0))
         .reduce(f64::min)
         .unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_point_on_a_ray_comes_back_to_its_pixel() {
+        let (size, dims) = ([37, 22], [40, 60, 50]);
+        let camera = Camera::orbit([20.0, 30.0, 25.0], 30.0, 25.0, 40.0, 50.0, 37.0 / 22.0);
+        let world = DMat4::from_translation(DVec3::new(3.0, -2.0, 1.0))
+            * DMat4::from_scale(DVec3::new(1.0, 0.5, 2.0));
+        let view = FrameView::new(&camera, size, world.to_cols_array_2d(), dims).unwrap();
+        let rows = view.pixel_from_index().map(|r| DVec4::from(r.map(f64::from)));
+        for pixel in [[0, 0], [36, 21], [5, 17]] {
+            let (origin, direction, depth_per_voxel) = view.ray(pixel);
+            for t in [1.0, 30.0] {
+                let p = (DVec3::from(origin) + t * DVec3::from(direction)).extend(1.0);
+                let [x, y, w, depth] = rows.map(|row| row.dot(p));
+                assert!((x / w - f64::from(pixel[0]) - 0.5).abs() < 1e-4, "{pixel:?}");
+                assert!((y / w - f64::from(pixel[1]) - 0.5).abs() < 1e-4, "{pixel:?}");
+                assert!((depth - view.start_depth() - t * depth_per_voxel).abs() < 1e-4);
+            }
+        }
+    }
 }

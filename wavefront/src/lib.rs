@@ -16,6 +16,7 @@ mod rays;
 mod run_ahead;
 mod samples;
 mod strategy;
+pub mod wgsl;
 
 #[cfg(feature = "block-sorted")]
 pub use block_sorted::{BlockSorted, BlockSortedOptions, BlockSortedPlan};

@@ -53,11 +53,26 @@ impl RayOrder {
         let corner = [square % self.columns, square / self.columns].map(|s| s * edge);
         [corner[0] + even_bits(code), corner[1] + even_bits(code >> 1)]
     }
+
+    /// The number of a pixel: twin of `frame_number`.
+    pub fn number(&self, pixel: [u32; 2]) -> u32 {
+        let shift = TILE.ilog2() + self.level;
+        let [column, row] = pixel.map(|p| p >> shift);
+        let inside = pixel.map(|p| p & ((1 << shift) - 1));
+        ((row * self.columns + column) << self.bits())
+            | spread_bits(inside[0])
+            | spread_bits(inside[1]) << 1
+    }
 }
 
 /// Bits 0, 2, 4, .. of the code, put together.
 fn even_bits(code: u32) -> u32 {
     (0..16).map(|bit| (code >> (2 * bit) & 1) << bit).sum()
+}
+
+/// The bits of a number below 2^16, with a zero after each.
+fn spread_bits(number: u32) -> u32 {
+    (0..16).map(|bit| (number >> bit & 1) << (2 * bit)).sum()
 }
 
 #[cfg(test)]
@@ -71,6 +86,7 @@ mod tests {
             let mut seen = vec![0; (size[0] * size[1]) as usize];
             for number in 0..order.numbers() {
                 let [x, y] = order.pixel(number as u32);
+                assert_eq!(order.number([x, y]), number as u32, "{size:?}");
                 if x < size[0] && y < size[1] {
                     seen[(x + size[0] * y) as usize] += 1;
                 }

@@ -9,6 +9,8 @@ use gpu_primitives::wgsl::{Constant, Module};
 
 pub(crate) const OUTPUTS: Module =
     Module { name: "outputs", source: include_str!("../shader/lib/outputs.wgsl") };
+pub(crate) const SHADING: Module =
+    Module { name: "shading", source: include_str!("../shader/lib/shading.wgsl") };
 
 /// Depth of pixels without a hit in the depth texture: the largest f32, since shaders have no
 /// infinity.
@@ -218,6 +220,11 @@ impl OutputTextures {
         self.position(DEPTH).map(|i| &*self.textures[i])
     }
 
+    /// View of [`OutputTextures::normal`].
+    pub fn normal_view(&self) -> Option<&wgpu::TextureView> {
+        self.position(NORMAL).map(|i| &self.views[i])
+    }
+
     /// View of [`OutputTextures::depth`].
     pub fn depth_view(&self) -> Option<&wgpu::TextureView> {
         self.position(DEPTH).map(|i| &self.views[i])
@@ -279,7 +286,7 @@ impl Default for Shading {
     }
 }
 
-/// Uniform struct `ShadingParams` of `shader/lib/outputs.wgsl`.
+/// Uniform struct `ShadingParams` of `shader/lib/shading.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct ShadingParams {

@@ -10,11 +10,12 @@ use gpu_primitives::wgsl::{Constant, Module, compose_fixed};
 use gpu_primitives::{indirect, wgpu};
 
 use crate::frame::{FrameParams, PARAMS_BYTES};
-use crate::outputs::{OUTPUTS, OutputTextures, Outputs, ShadingParams};
+use crate::outputs::{OUTPUTS, OutputTextures, Outputs, SHADING, ShadingParams};
 use crate::plan::{ARGS_BYTES, FILL_ARGS_BYTES, RAYS_HEADER_WORDS, WavefrontPlan};
 use crate::samples::{SampleLayout, Samples};
 
-const FRAME: Module = Module { name: "frame", source: include_str!("../shader/lib/frame.wgsl") };
+pub(crate) const FRAME: Module =
+    Module { name: "frame", source: include_str!("../shader/lib/frame.wgsl") };
 const CELL: Module = Module { name: "cell", source: include_str!("../shader/lib/cell.wgsl") };
 const BLOCK_WALK: Module =
     Module { name: "block_walk", source: include_str!("../shader/lib/block_walk.wgsl") };
@@ -100,6 +101,7 @@ pub(crate) fn library(samples: SampleLayout) -> Vec<Module> {
         WORK,
         samples.module(),
         OUTPUTS,
+        SHADING,
         indirect::MODULE,
         scan::GROUP_MODULE,
     ];
@@ -273,9 +275,20 @@ impl RayBuffers {
         &self.plan
     }
 
-    /// The frame's uniform.
-    pub(crate) fn frame(&self) -> &wgpu::Buffer {
+    /// The frame's uniform: [`FrameParams`].
+    pub fn frame(&self) -> &wgpu::Buffer {
         &self.frame
+    }
+
+    /// The shading's uniform: [`ShadingParams`].
+    pub fn shading(&self) -> &wgpu::Buffer {
+        &self.shading
+    }
+
+    /// Words 4, 5 and 6: arguments of a dispatch over all words of active bits, 256 for a workgroup. They give no
+    /// workgroup when no ray is active.
+    pub fn active_args(&self) -> &wgpu::Buffer {
+        &self.args
     }
 
     /// Arguments of a dispatch over the listed rays.

@@ -122,6 +122,22 @@ fn frame_pixel(frame: FrameParams, ray: u32) -> vec2<u32> {
     return corner * (8u << frame.ray_level) + frame_even_bits(vec2<u32>(code, code >> 1u));
 }
 
+// A number below 2^16 with a zero after each of its bits, of both components.
+fn frame_spread_bits(number: vec2<u32>) -> vec2<u32> {
+    var v = (number | (number << vec2<u32>(8u))) & vec2<u32>(0x00ff00ffu);
+    v = (v | (v << vec2<u32>(4u))) & vec2<u32>(0x0f0f0f0fu);
+    v = (v | (v << vec2<u32>(2u))) & vec2<u32>(0x33333333u);
+    return (v | (v << vec2<u32>(1u))) & vec2<u32>(0x55555555u);
+}
+
+// The ray of a pixel of the picture: the inverse of frame_pixel.
+fn frame_number(frame: FrameParams, pixel: vec2<u32>) -> u32 {
+    let shift = 3u + frame.ray_level;
+    let square = pixel >> vec2<u32>(shift);
+    let bits = frame_spread_bits(pixel & vec2<u32>((1u << shift) - 1u));
+    return ((square.y * frame.ray_columns + square.x) << (2u * shift)) | bits.x | (bits.y << 1u);
+}
+
 fn frame_block_position(frame: FrameParams, block: u32) -> vec3<i32> {
     let size = frame.grid.blocks;
     return vec3<i32>(vec3<u32>(block % size.x, (block / size.x) % size.y, block / (size.x * size.y)));

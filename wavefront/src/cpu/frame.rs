@@ -1,8 +1,9 @@
 //! Twin of `shader/lib/frame.wgsl`: the ray of a pixel.
 
-use macrocell::cpu::dda::Ray;
+use macrocell::cpu::dda::{CellBox, Ray};
 
-use crate::FrameParams;
+use crate::plan::RAYS_HEADER_WORDS;
+use crate::{FrameParams, RayOrder};
 
 /// A pixel's ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,5 +31,47 @@ impl FrameRay {
     /// View depth at parameter `t`.
     pub fn depth(&self, frame: &FrameParams, t: f32) -> f32 {
         frame.start_depth + t * self.depth_per_voxel
+    }
+
+    /// Parameter at a view depth.
+    pub fn t(&self, frame: &FrameParams, depth: f32) -> f32 {
+        (depth - frame.start_depth) / self.depth_per_voxel
+    }
+}
+
+/// The rays' states, as read back from [`crate::RayBuffers::rays`].
+#[derive(Clone, Copy, Debug)]
+pub struct RayStates<'a> {
+    frame: &'a FrameParams,
+    order: RayOrder,
+    words: &'a [u32],
+}
+
+impl<'a> RayStates<'a> {
+    /// The words of the buffer of a frame's rays.
+    pub fn new(frame: &'a FrameParams, words: &'a [u32]) -> Self {
+        Self { frame, order: RayOrder::new([frame.width, frame.height]), words }
+    }
+
+    /// Whether a pixel's ray is not finished.
+    pub fn is_active(&self, pixel: [u32; 2]) -> bool {
+        let number = self.order.number(pixel) as usize;
+        let first = RAYS_HEADER_WORDS as usize + self.frame.ray_numbers as usize;
+        (self.words[first + number / 32] >> (number % 32)) & 1 != 0
+    }
+
+    /// The block in which an active ray waits.
+    pub fn block(&self, pixel: [u32; 2]) -> [i32; 3] {
+        let FrameParams { shift_y, shift_z, shift_misses, .. } = *self.frame;
+        let state = self.words[RAYS_HEADER_WORDS as usize + self.order.number(pixel) as usize];
+        let place = |from: u32, to: u32| ((state & ((1 << to) - 1)) >> from) as i32;
+        [place(0, shift_y), place(shift_y, shift_z), place(shift_z, shift_misses)]
+    }
+
+    /// Where an active ray enters the block in which it waits: no hit is nearer.
+    pub fn t_low(&self, pixel: [u32; 2]) -> f32 {
+        let ray = FrameRay::new(self.frame, pixel).ray;
+        let cell = self.block(pixel).map(|b| 4 * b);
+        ray.entry(CellBox::around(cell, 2, self.frame.grid.last_cell)).t
     }
 }

@@ -3,4 +3,5 @@
 pub mod block_walk;
 pub mod cell;
 pub mod frame;
+pub mod shading;
 pub mod walk;

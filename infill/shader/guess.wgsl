@@ -1,0 +1,92 @@
+// The candidates of every hole but that of history: neighbours, coarse field, its thin variant. A workgroup for
+// every tile with holes.
+#import infill_params
+#import infill_rays
+#import candidate
+#import shading
+#import indirect
+#ifdef NEIGHBOURS
+#import pull
+#endif
+#ifdef COARSE_FIELD
+#import march
+#endif
+
+@group(0) @binding(0) var<uniform> frame: FrameParams;
+@group(0) @binding(1) var<uniform> shading: ShadingParams;
+@group(0) @binding(2) var<uniform> params: InfillParams;
+@group(0) @binding(3) var<storage, read> rays: array<u32>;
+@group(0) @binding(4) var<storage, read> tiles: array<u32>;
+@group(0) @binding(5) var<storage, read_write> candidates: array<u32>;
+#ifdef NEIGHBOURS
+@group(0) @binding(AVERAGES_BINDING) var<storage, read> averages: array<vec4<u32>>;
+#endif
+#ifdef COARSE_FIELD
+@group(0) @binding(COARSE_BINDING) var<storage, read> coarse_ranges: array<vec2<f32>>;
+@group(0) @binding(COARSE_BINDING + 1u) var<storage, read> codes_0: array<u32>;
+#ifdef CODE_PAGES_2
+@group(0) @binding(COARSE_BINDING + 2u) var<storage, read> codes_1: array<u32>;
+#endif
+#ifdef CODE_PAGES_3
+@group(0) @binding(COARSE_BINDING + 3u) var<storage, read> codes_2: array<u32>;
+#endif
+#endif
+
+const LIST: u32 = 0u;
+
+fn guess(pixel: vec2<u32>, number: u32, inside: vec2<u32>) -> vec3<u32> {
+    let ray = frame_ray(frame, pixel).ray;
+    let to_viewer = shading_to_viewer(ray.direction);
+    let t_low = infill_t_low(ray, number);
+    var words = vec3<u32>(CANDIDATE_NONE);
+#ifdef NEIGHBOURS
+    let average = pull_pixel(inside);
+    if (average.weight > 0.0) {
+        let distance = select(0.0, average.t / average.coverage - t_low, average.coverage > 0.0);
+        let normal = shading_safe_normalize(average.normal, to_viewer);
+        words.x = candidate_pack(average.coverage / average.weight, normal, distance);
+    }
+#endif
+#ifdef COARSE_FIELD
+    let most_steps = MARCH_MOST_STEPS + frame_zero(number);
+    let march = march(ray, infill_volume(), t_low, frame.isovalue, most_steps);
+    let miss = candidate_pack(0.0, vec3<f32>(0.0), 0.0);
+    words.y = miss;
+    words.z = miss;
+    if (march.hit.x) {
+        let gradient = coarse_gradient(march_at(ray, march.t.x), march.shares.x);
+        words.y = candidate_pack(1.0, shading_normal(gradient, to_viewer), march.t.x - t_low);
+    }
+    if (march.hit.y) {
+        let gradient = coarse_gradient(march_at(ray, march.t.y), march.shares.y);
+        words.z = candidate_pack(1.0, shading_normal(gradient, to_viewer), march.t.y - t_low);
+    }
+#endif
+    return words;
+}
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let index = indirect_linear_group(group, groups);
+    let listed = index < tiles[LIST];
+    let corner = infill_tile_corner(params, tiles[infill_list_word(params, LIST, select(0u, index, listed))]);
+#ifdef NEIGHBOURS
+    pull_tile(corner, lane);
+#endif
+    for (var i = lane; i < INFILL_TILE * INFILL_TILE; i += 64u) {
+        let inside = vec2<u32>(i % INFILL_TILE, i / INFILL_TILE);
+        let pixel = corner + inside;
+        let number = frame_number(frame, pixel);
+        if (listed && all(pixel < params.size) && infill_is_hole(number)) {
+            let words = guess(pixel, number, inside);
+            let first = 3u * infill_pixel_index(params, pixel);
+            candidates[first] = words.x;
+            candidates[first + 1u] = words.y;
+            candidates[first + 2u] = words.z;
+        }
+    }
+}

@@ -1,0 +1,80 @@
+// Averages of the finished pixels, from 2x2 pixels to 16x16. A workgroup for every tile with holes and its
+// neighbours, an invocation for 2x2 pixels.
+#import infill_params
+#import infill_rays
+#import average
+#import indirect
+
+@group(0) @binding(0) var<uniform> frame: FrameParams;
+@group(0) @binding(1) var<uniform> params: InfillParams;
+@group(0) @binding(2) var<storage, read> rays: array<u32>;
+@group(0) @binding(3) var<storage, read> tiles: array<u32>;
+@group(0) @binding(4) var<storage, read_write> averages: array<vec4<u32>>;
+@group(0) @binding(5) var depth: texture_2d<f32>;
+@group(0) @binding(6) var normals: texture_2d<f32>;
+
+const LIST: u32 = 1u;
+
+var<workgroup> texels: array<Average, 64>;
+
+fn pixel_average(pixel: vec2<u32>) -> Average {
+    if (any(pixel >= params.size) || infill_is_hole(frame_number(frame, pixel))) {
+        return average_none();
+    }
+    let normal = textureLoad(normals, pixel, 0).xyz;
+    if (all(normal == vec3<f32>(0.0))) {
+        return Average(1.0, 0.0, vec3<f32>(0.0), 0.0);
+    }
+    let t = (textureLoad(depth, pixel, 0).x - frame.start_depth) / frame_ray(frame, pixel).depth_per_voxel;
+    return Average(1.0, 1.0, normal, t);
+}
+
+fn write(level: u32, texel: vec2<u32>, value: Average) {
+    let width = (params.size + vec2<u32>((2u << level) - 1u)) >> vec2<u32>(level + 1u);
+    if (all(texel < width)) {
+        averages[params.levels[level] + texel.x + width.x * texel.y] = average_pack(value);
+    }
+}
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let index = indirect_linear_group(group, groups);
+    let listed = index < tiles[LIST];
+    let corner = infill_tile_corner(params, tiles[infill_list_word(params, LIST, select(0u, index, listed))]);
+    let own = vec2<u32>(lane & 7u, lane >> 3u);
+    var sum = average_none();
+    for (var child = 0u; child < 4u; child++) {
+        let pixel = corner + 2u * own + vec2<u32>(child & 1u, child >> 1u);
+        sum = average_plus(sum, pixel_average(pixel), 1.0);
+    }
+    let first = average_limited(sum);
+    texels[lane] = first;
+    if (listed) {
+        write(0u, corner / 2u + own, first);
+    }
+    // 8x8 texels become 4x4, 2x2, 1.
+    for (var level = 1u; level < 4u; level++) {
+        workgroupBarrier();
+        let edge = 8u >> level;
+        let place = vec2<u32>(lane % edge, lane / edge);
+        var next = average_none();
+        if (lane < edge * edge) {
+            for (var child = 0u; child < 4u; child++) {
+                let source = 2u * place + vec2<u32>(child & 1u, child >> 1u);
+                next = average_plus(next, texels[source.x + 2u * edge * source.y], 1.0);
+            }
+            next = average_limited(next);
+        }
+        workgroupBarrier();
+        if (lane < edge * edge) {
+            texels[lane] = next;
+            if (listed) {
+                write(level, (corner >> vec2<u32>(level + 1u)) + place, next);
+            }
+        }
+    }
+}

@@ -1,0 +1,65 @@
+// The previous frame's hits into the next picture. One invocation per pixel of the previous frame, whose pictures are
+// still there.
+#import infill_params
+#import history
+#import shading
+#import indirect
+
+struct ScatterParams {
+    // Rows that take an index-space position to (column * w, row * w, w, view depth) of the next frame.
+    column: vec4<f32>,
+    row: vec4<f32>,
+    w: vec4<f32>,
+    depth: vec4<f32>,
+}
+
+@group(0) @binding(0) var<uniform> old_frame: FrameParams;
+@group(0) @binding(1) var<uniform> frame: FrameParams; // the next one
+@group(0) @binding(2) var<uniform> shading: ShadingParams;
+@group(0) @binding(3) var<uniform> params: InfillParams;
+@group(0) @binding(4) var<uniform> scatter: ScatterParams;
+@group(0) @binding(5) var<storage, read> rays: array<u32>; // of the previous frame
+@group(0) @binding(6) var<storage, read_write> keys: array<atomic<u32>>;
+@group(0) @binding(7) var depth: texture_2d<f32>;
+@group(0) @binding(8) var normals: texture_2d<f32>;
+
+const FARTHEST: f32 = 3.0e38;
+
+fn place_hit(position: vec4<f32>, normal: vec3<f32>) {
+    let w = dot(scatter.w, position);
+    let place = vec2<f32>(dot(scatter.column, position), dot(scatter.row, position)) / w;
+    let inside = all(place >= vec2<f32>(0.0)) && all(place < vec2<f32>(params.size));
+    if (!(w > 0.0 && inside)) {
+        return;
+    }
+    let pixel = vec2<u32>(place);
+    let frame_ray = frame_ray(frame, pixel);
+    let ray = frame_ray.ray;
+    if (!dda_meets(ray, infill_volume()) || dot(normal, shading_to_viewer(ray.direction)) <= 0.0) {
+        return;
+    }
+    let t = (dot(scatter.depth, position) - frame.start_depth) / frame_ray.depth_per_voxel;
+    let key = history_key(t - dda_entry(ray, infill_volume()).t, normal);
+    atomicMax(&keys[infill_pixel_index(params, pixel)], key);
+}
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let number = indirect_linear_group(group, groups) * 64u + lane;
+    let pixel = frame_pixel(old_frame, number);
+    if (number >= old_frame.ray_numbers || any(pixel >= params.size)) {
+        return;
+    }
+    let view_depth = textureLoad(depth, pixel, 0).x;
+    if (view_depth >= FARTHEST) {
+        return;
+    }
+    let frame_ray = frame_ray(old_frame, pixel);
+    let t = (view_depth - old_frame.start_depth) / frame_ray.depth_per_voxel;
+    let position = frame_ray.ray.origin + t * frame_ray.ray.direction;
+    place_hit(vec4<f32>(position, 1.0), textureLoad(normals, pixel, 0).xyz);
+}

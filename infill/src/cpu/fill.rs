@@ -1,0 +1,233 @@
+//! Twin of `shader/lib/features.wgsl` and `shader/fill.wgsl`: from a picture with holes to a filled one.
+
+use macrocell::Grid;
+use wavefront::cpu::frame::FrameRay;
+use wavefront::cpu::shading::{self, dot};
+use wavefront::{FrameParams, ShadingParams};
+
+use super::candidate::{Candidate, Packed};
+use super::field::CoarseField;
+use super::march::march;
+use super::network::{FEATURES, Map, OUTPUTS, network};
+use super::push_pull::{Average, Pyramid};
+use super::reproject;
+use crate::options::{PRIOR, Sources};
+use crate::weights::Weights;
+
+/// A finished pixel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Finished {
+    /// No surface.
+    Background,
+    /// The surface: view depth in world units and world-space unit normal.
+    Hit {
+        /// View depth.
+        depth: f32,
+        /// Normal.
+        normal: [f32; 3],
+    },
+}
+
+/// What a fill needs to know.
+#[derive(Debug)]
+pub struct Scene<'a> {
+    /// The frame.
+    pub frame: &'a FrameParams,
+    /// Its shading.
+    pub shading: &'a ShadingParams,
+    /// The volume's grids.
+    pub grid: Grid,
+    /// The coarse field, unless it is left out.
+    pub field: Option<&'a CoarseField>,
+    /// Finished pixels, row by row; `None` for holes.
+    pub pixels: &'a [Option<Finished>],
+    /// Where the rays of holes wait, in voxels; anything elsewhere.
+    pub t_low: &'a [f32],
+    /// Least keys of the previous frame's hits, if there is one.
+    pub history: Option<&'a [u32]>,
+    /// Candidates to be used.
+    pub sources: Sources,
+}
+
+/// The candidates of a hole in the order of [`crate::options::Source`].
+pub type Candidates = [Option<Candidate>; 4];
+
+impl Scene<'_> {
+    /// Width and height.
+    pub fn size(&self) -> [u32; 2] {
+        self.frame.size()
+    }
+
+    fn index(&self, pixel: [u32; 2]) -> usize {
+        (pixel[0] + self.size()[0] * pixel[1]) as usize
+    }
+
+    fn average(&self, pixel: [u32; 2]) -> Average {
+        match self.pixels[self.index(pixel)] {
+            None => Average::default(),
+            Some(Finished::Background) => Average { weight: 1.0, ..Average::default() },
+            Some(Finished::Hit { depth, normal }) => {
+                let t = FrameRay::new(self.frame, pixel).t(self.frame, depth);
+                Average { weight: 1.0, coverage: 1.0, normal, t }
+            }
+        }
+    }
+
+    /// What is known of the surroundings, if that is used.
+    pub fn pyramid(&self) -> Option<Pyramid> {
+        self.sources.neighbours.then(|| Pyramid::new(self.size(), |pixel| self.average(pixel)))
+    }
+
+    /// The candidates of a hole.
+    pub fn candidates(&self, pyramid: Option<&Pyramid>, pixel: [u32; 2]) -> Candidates {
+        let frame_ray = FrameRay::new(self.frame, pixel);
+        let ray = &frame_ray.ray;
+        let to_viewer = shading::to_viewer(self.shading, ray.direction);
+        let t_low = self.t_low[self.index(pixel)];
+        let neighbours =
+            pyramid.map(|p| p.at(pixel)).filter(|a| a.weight > 0.0).map(|a| Candidate {
+                coverage: a.coverage / a.weight,
+                normal: shading::safe_normalize(a.normal, to_viewer),
+                distance: if a.coverage > 0.0 { a.t / a.coverage - t_low } else { 0.0 },
+            });
+        let miss = Candidate { coverage: 0.0, normal: [0.0; 3], distance: 0.0 };
+        let coarse = self.field.filter(|_| self.sources.coarse_field).map(|field| {
+            march(&self.grid, field, ray, t_low, self.frame.isovalue()).map(|hit| {
+                hit.map_or(miss, |hit| Candidate {
+                    coverage: 1.0,
+                    normal: shading::normal(self.shading, hit.gradient, to_viewer),
+                    distance: hit.t - t_low,
+                })
+            })
+        });
+        let history = self.history.filter(|_| self.sources.history).and_then(|keys| {
+            reproject::candidate(&self.grid, &frame_ray, keys[self.index(pixel)], t_low)
+        });
+        [neighbours, coarse.map(|c| c[0]), coarse.map(|c| c[1]), history]
+    }
+}
+
+/// The network's inputs at a finished pixel, from its coverage and N.V.
+pub fn finished_features(coverage: f32, facing: f32) -> [f32; FEATURES] {
+    let (c, cn) = (coverage, coverage * facing);
+    [1.0, c, cn, c, cn, c, cn, c, cn, 1.0, c, cn, 0.0, 0.0, 0.0, 0.0]
+}
+
+/// The network's inputs at a hole.
+pub fn features(candidates: &[Packed; 4], to_viewer: [f32; 3]) -> [f32; FEATURES] {
+    let mut features = [0.0; FEATURES];
+    for (i, candidate) in candidates.iter().enumerate() {
+        let first = 3 + 2 * i + usize::from(i == 3);
+        features[first] = candidate.coverage;
+        features[first + 1] = candidate.coverage * candidate.facing(to_viewer);
+    }
+    features[9] = f32::from(u8::from(candidates[3].valid));
+    // Coarse field, its thin variant, neighbours, history.
+    features[12..].copy_from_slice(&[1, 2, 0, 3].map(|i: usize| candidates[i].soft_distance));
+    features
+}
+
+/// A filled pixel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Filled {
+    /// Share of the pixel that shows the surface.
+    pub coverage: f32,
+    /// N.V.
+    pub facing: f32,
+    /// World-space unit normal with that N.V.
+    pub normal: [f32; 3],
+}
+
+/// Some unit vector perpendicular to a unit vector.
+fn perpendicular(v: [f32; 3]) -> [f32; 3] {
+    let other = if v[2].abs() < 0.9 { [-v[1], v[0], 0.0] } else { [0.0, -v[2], v[1]] };
+    shading::safe_normalize(other, [1.0, 0.0, 0.0])
+}
+
+/// The mixture of a hole's candidates, with what the network says; `None` without any candidate.
+pub fn mix(candidates: &[Packed; 4], output: &[f32], to_viewer: [f32; 3]) -> Option<Filled> {
+    let logit = |i: usize| PRIOR[i] + output[i];
+    let valid = || (0..4).filter(|&i| candidates[i].valid);
+    let most = valid().map(logit).reduce(f32::max)?;
+    let (mut total, mut coverage, mut facing, mut normal) = (0.0, 0.0, 0.0, [0.0; 3]);
+    for i in valid() {
+        let candidate = &candidates[i];
+        let weight = (logit(i) - most).exp();
+        let covered = weight * candidate.coverage;
+        total += weight;
+        coverage += covered;
+        facing += covered * candidate.facing(to_viewer);
+        normal = std::array::from_fn(|a| normal[a] + covered * candidate.normal[a]);
+    }
+    let mean = if coverage > 0.0 { facing / coverage } else { 0.5 };
+    let facing = (mean + output[5]).clamp(0.0, 1.0);
+    // Of the normal only the direction around the view axis stays.
+    let along = dot(normal, to_viewer);
+    let across: [f32; 3] = std::array::from_fn(|a| normal[a] - along * to_viewer[a]);
+    let across = if dot(across, across) > 1e-12 {
+        shading::safe_normalize(across, perpendicular(to_viewer))
+    } else {
+        perpendicular(to_viewer)
+    };
+    let sine = (1.0 - facing * facing).max(0.0).sqrt();
+    Some(Filled {
+        coverage: (coverage / total + output[4]).clamp(0.0, 1.0),
+        facing,
+        normal: std::array::from_fn(|a| facing * to_viewer[a] + sine * across[a]),
+    })
+}
+
+/// A filled picture.
+#[derive(Clone, Debug)]
+pub struct Fill {
+    /// Holes: what fills them. `None` for finished pixels and holes without a candidate.
+    pub pixels: Vec<Option<Filled>>,
+    /// What the network gave, at the size padded to multiples of 4.
+    pub outputs: Map,
+}
+
+impl Scene<'_> {
+    /// Fills every hole.
+    pub fn fill(&self, weights: &Weights) -> Fill {
+        let size = self.size();
+        let pyramid = self.pyramid();
+        let all = || (0..size[0] * size[1]).map(|i| [i % size[0], i / size[0]]);
+        let to_viewer = |pixel| {
+            shading::to_viewer(self.shading, FrameRay::new(self.frame, pixel).ray.direction)
+        };
+        let packed: Vec<Option<[Packed; 4]>> = all()
+            .zip(self.pixels)
+            .map(|(pixel, finished)| {
+                let hole = finished.is_none();
+                hole.then(|| {
+                    let candidates = self.candidates(pyramid.as_ref(), pixel);
+                    candidates.map(|c| Candidate::unpack(Candidate::pack(c)))
+                })
+            })
+            .collect();
+        let padded = size.map(|s| s.next_multiple_of(4) as usize);
+        let mut inputs = Map::zero(padded, FEATURES);
+        for (pixel, candidates) in all().zip(&packed) {
+            let viewer = to_viewer(pixel);
+            let values = match (candidates, self.pixels[self.index(pixel)]) {
+                (Some(candidates), _) => features(candidates, viewer),
+                (None, Some(Finished::Hit { normal, .. })) => {
+                    finished_features(1.0, dot(normal, viewer).clamp(0.0, 1.0))
+                }
+                (None, _) => finished_features(0.0, 0.0),
+            };
+            let first = (pixel[0] as usize + padded[0] * pixel[1] as usize) * FEATURES;
+            inputs.values[first..first + FEATURES].copy_from_slice(&values);
+        }
+        let outputs = network(weights, &inputs);
+        debug_assert_eq!(outputs.channels, OUTPUTS);
+        let pixels = all()
+            .zip(&packed)
+            .map(|(pixel, candidates)| {
+                let output = outputs.texel(pixel[0] as usize, pixel[1] as usize);
+                candidates.as_ref().and_then(|c| mix(c, output, to_viewer(pixel)))
+            })
+            .collect();
+        Fill { pixels, outputs }
+    }
+}

@@ -1,0 +1,12 @@
+//! The filler on the CPU: twins of the kernels, dense, for tests and for making training data.
+
+pub mod candidate;
+pub mod field;
+pub mod fill;
+pub mod march;
+pub mod network;
+pub mod push_pull;
+pub mod reproject;
+
+pub use candidate::Candidate;
+pub use fill::{Fill, Finished, Scene, features};

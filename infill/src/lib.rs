@@ -1,0 +1,18 @@
+#![doc = include_str!("../README.md")]
+
+pub mod cpu;
+mod error;
+mod kernels;
+#[cfg(test)]
+mod layout_tests;
+pub mod options;
+mod plan;
+mod stage;
+pub mod weights;
+
+pub use error::Error;
+pub use gpu_primitives::wgpu;
+pub use options::{Look, PRIOR, Source, Sources};
+pub use plan::InfillPlan;
+pub use stage::{Infill, InfillBuffers, Method, Scene};
+pub use weights::Weights;

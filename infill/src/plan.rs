@@ -1,0 +1,197 @@
+//! Sizes, before anything is allocated.
+
+use gpu_primitives::wgpu;
+use macrocell::MacrocellPlan;
+use wavefront::FrameParams;
+
+use crate::Error;
+use crate::kernels::{InfillParams, ScatterParams};
+use crate::options::{Look, Sources};
+use crate::weights::PackedWeights;
+
+/// Pixels on the edge of a tile.
+pub(crate) const TILE: u32 = 16;
+
+/// Levels of averages, from 2x2 pixels on.
+pub(crate) const LEVELS: usize = crate::cpu::push_pull::LEVELS;
+
+/// Most pages of range codes that the kernel of the coarse field binds.
+const MOST_CODE_PAGES: usize = 3;
+
+/// Lists of tiles: those with holes, with their neighbours, and those within two tiles.
+pub(crate) const LISTS: u64 = 3;
+const TILES_HEADER_WORDS: u64 = 4;
+
+/// Bytes of the arguments of dispatches over the lists, and over the rays' active bits.
+pub(crate) const ARGS_BYTES: u64 = 16 * LISTS;
+pub(crate) const GATE_BYTES: u64 = 16;
+
+/// Bytes of a texel of averages, and of four channels of a map.
+const AVERAGE_BYTES: u64 = 16;
+const GROUP_BYTES: u64 = 8;
+
+/// What a scene's in-fill consists of and the sizes of everything that this crate allocates for it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct InfillPlan {
+    size: [u32; 2],
+    sources: Sources,
+    network: bool,
+    code_pages: usize,
+    diagonal_squared: u64,
+    coarse_per_page: u64,
+}
+
+impl InfillPlan {
+    /// Plans in-fill of pictures of `size` pixels. The coarse field is left out where the volume's ranges lie in more
+    /// pages than a kernel can bind.
+    ///
+    /// # Errors
+    /// If a buffer for so many pixels would exceed the limits.
+    pub fn new(
+        size: [u32; 2],
+        sources: Sources,
+        network: bool,
+        ranges: &MacrocellPlan,
+        limits: &wgpu::Limits,
+    ) -> Result<Self, Error> {
+        let code_pages = ranges.pages().count();
+        let has_cells = ranges.grid().last_cell().iter().all(|&last| last >= 0);
+        let coarse_field = sources.coarse_field && code_pages <= MOST_CODE_PAGES && has_cells;
+        let plan = Self {
+            size,
+            sources: Sources { coarse_field, ..sources },
+            network,
+            code_pages: if coarse_field { code_pages } else { 0 },
+            diagonal_squared: ranges
+                .grid()
+                .dims()
+                .iter()
+                .map(|&d| u64::from(d) * u64::from(d))
+                .sum(),
+            coarse_per_page: ranges.coarse_per_page(),
+        };
+        let available = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let needed = plan.candidate_bytes().max(plan.shared_bytes());
+        if needed > available {
+            let [width, height] = size;
+            return Err(Error::PictureSize { width, height, needed, available });
+        }
+        Ok(plan)
+    }
+
+    /// Width and height in pixels.
+    pub fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    /// The sources that are in.
+    pub fn sources(&self) -> Sources {
+        self.sources
+    }
+
+    /// Whether the network is in.
+    pub fn network(&self) -> bool {
+        self.network
+    }
+
+    /// Pages of range codes that the coarse field reads; 0 without it.
+    pub(crate) fn code_pages(&self) -> usize {
+        self.code_pages
+    }
+
+    pub(crate) fn tiles(&self) -> [u32; 2] {
+        self.size.map(|s| s.div_ceil(TILE))
+    }
+
+    pub(crate) fn padded(&self) -> [u32; 2] {
+        self.size.map(|s| s.next_multiple_of(4))
+    }
+
+    fn pixels(&self) -> u64 {
+        u64::from(self.size[0]) * u64::from(self.size[1])
+    }
+
+    fn padded_texels(&self, level: u32) -> u64 {
+        self.padded().iter().map(|&s| u64::from(s >> level)).product()
+    }
+
+    /// First texel of every level of averages, and their number.
+    fn levels(&self) -> ([u64; LEVELS], u64) {
+        let mut next = 0;
+        let first = std::array::from_fn(|level| {
+            let first = next;
+            next += self.size.iter().map(|s| u64::from(s.div_ceil(2 << level))).product::<u64>();
+            first
+        });
+        (first, next)
+    }
+
+    /// Words of the header, the bits and the lists of tiles.
+    pub(crate) fn tile_bytes(&self) -> u64 {
+        let [x, y] = self.tiles().map(u64::from);
+        4 * (self.tile_header_words() + LISTS * x * y)
+    }
+
+    /// Words that a fill begins by clearing.
+    pub(crate) fn tile_header_words(&self) -> u64 {
+        let [x, y] = self.tiles().map(u64::from);
+        TILES_HEADER_WORDS + (x * y).div_ceil(32)
+    }
+
+    pub(crate) fn candidate_bytes(&self) -> u64 {
+        12 * self.pixels()
+    }
+
+    /// Bytes of the previous frame's hits; 0 without history.
+    pub(crate) fn history_bytes(&self) -> u64 {
+        if self.sources.history { 4 * self.pixels() } else { 0 }
+    }
+
+    /// Bytes of the averages and, once they are used, of the network's first map.
+    pub(crate) fn shared_bytes(&self) -> u64 {
+        let averages = if self.sources.neighbours { AVERAGE_BYTES * self.levels().1 } else { 0 };
+        let map = if self.network { GROUP_BYTES * self.padded_texels(0) } else { 0 };
+        averages.max(map)
+    }
+
+    /// Bytes of a map of `groups` times four channels at a level, 1 for halves.
+    pub(crate) fn map_bytes(&self, level: u32, groups: u64) -> u64 {
+        if self.network { groups * GROUP_BYTES * self.padded_texels(level) } else { 0 }
+    }
+
+    /// Everything together.
+    pub fn bytes(&self) -> u64 {
+        let history = if self.sources.history {
+            FrameParams::BYTES + size_of::<ScatterParams>() as u64
+        } else {
+            0
+        };
+        let weights = if self.network { PackedWeights::BYTES } else { 0 };
+        self.tile_bytes()
+            + ARGS_BYTES
+            + GATE_BYTES
+            + self.candidate_bytes()
+            + self.history_bytes()
+            + history
+            + self.shared_bytes()
+            + 2 * self.map_bytes(1, 2)
+            + self.map_bytes(2, 3)
+            + weights
+            + size_of::<InfillParams>() as u64
+    }
+
+    pub(crate) fn params(&self, look: Look) -> InfillParams {
+        InfillParams {
+            size: self.size,
+            tiles: self.tiles(),
+            levels: self.levels().0.map(|first| first as u32),
+            padded: self.padded(),
+            coarse_per_page: self.coarse_per_page.min(u64::from(u32::MAX)) as u32,
+            crisp: look.crisp.into(),
+            diagonal: (self.diagonal_squared as f32).sqrt(),
+            none: 0.0,
+            complete: look.from_completeness,
+            pad0: 0,
+        }
+    }
+}

@@ -1,0 +1,20 @@
+//! WGSL that other kernels import.
+
+use gpu_primitives::wgsl::Module;
+
+use crate::outputs;
+use crate::rays;
+
+/// A frame's camera, grids and rays, and where the rays' states lie.
+pub const FRAME: Module = rays::FRAME;
+
+/// Shading of a surface.
+pub const SHADING: Module = outputs::SHADING;
+
+/// Everything a kernel needs to import from this crate, with what that imports.
+pub fn modules() -> Vec<Module> {
+    let mut modules = vec![FRAME, SHADING];
+    modules.extend(macrocell::wgsl::MODULES);
+    modules.extend(lru_cache_gpu::wgsl::MODULES);
+    modules
+}
