@@ -119,6 +119,11 @@ impl PassRecords {
         }
     }
 
+    /// Reads back what in-fill has to tell, too, or no longer.
+    pub(crate) fn set_infill(&mut self, infill: bool) {
+        self.readback.set_bytes(readback_bytes(infill));
+    }
+
     /// What became of a pass that cannot be made up for, if there was one.
     pub(crate) fn lost(&self) -> Option<Lost> {
         self.lost

@@ -151,15 +151,7 @@ impl ProgressiveIsoRenderer {
         if !isovalue.is_finite() || isovalue.abs() > LARGEST_VALUE {
             return Err(Error::Isovalue { found: isovalue });
         }
-        let planned = self.plan.infill.as_ref();
-        let possible = match frame.options.infill {
-            Infill::Off => true,
-            Infill::Classical => planned.is_some(),
-            Infill::Network => planned.is_some_and(|plan| plan.network()),
-        };
-        if !possible {
-            return Err(Error::InfillNotPlanned);
-        }
+        self.plan.check_infill(frame.options.infill)?;
         let view = self.view(frame)?;
         self.frame_count += 1;
         self.frame = Some(FrameState {
@@ -538,9 +530,14 @@ impl ProgressiveIsoRenderer {
         options: RendererOptions,
     ) -> Result<(), Error> {
         let plan = self.replan(&options)?;
+        let infill = self.frame.as_ref().map(|state| state.frame.options.infill);
+        plan.check_infill(infill.unwrap_or_default())?;
         let pictures = self.options.pictures() != options.pictures();
         let (layout, strategy) = (plan.samples.layout(), plan.strategy);
-        if pictures || (layout, strategy) != (self.plan.samples.layout(), self.plan.strategy) {
+        if pictures
+            || options.infill != self.options.infill
+            || (layout, strategy) != (self.plan.samples.layout(), self.plan.strategy)
+        {
             self.stages = self
                 .faults
                 .guard(device, Task::Pipelines, || Stages::new(device, &plan, &options))?;
@@ -553,6 +550,7 @@ impl ProgressiveIsoRenderer {
                 Ok(())
             })?;
         }
+        self.records.set_infill(options.infill.is_some());
         self.options = options;
         self.plan = plan;
         if let Some(state) = self.frame.take() {

@@ -49,6 +49,8 @@ pub struct ReadbackRing {
 struct Record {
     tag: u64,
     bytes: u64,
+    /// Bytes before the stamp.
+    room: u64,
     /// Which of the [`STAMPS`] the record ends with once it has run.
     stamp: usize,
     slot: Arc<Slot>,
@@ -58,6 +60,8 @@ struct Record {
 #[derive(Debug)]
 struct Staging {
     buffer: Arc<Buffer>,
+    /// Bytes before the stamp.
+    room: u64,
     next_stamp: usize,
 }
 
@@ -92,6 +96,12 @@ impl ReadbackRing {
             idle: Vec::new(),
             stamps: None,
         }
+    }
+
+    /// Changes how many bytes a record has at most. Those in flight stay as they are; their buffers go with them.
+    pub fn set_bytes(&mut self, bytes: u64) {
+        self.bytes = bytes.next_multiple_of(WORD_BYTES);
+        self.idle.retain(|staging| staging.room == self.bytes);
     }
 
     /// Bytes of a staging buffer: a record and its stamp.
@@ -139,9 +149,12 @@ impl ReadbackRing {
         if !self.has_room() {
             return false;
         }
-        let Staging { buffer, next_stamp: stamp } = match self.idle.pop() {
+        let Staging { buffer, room, next_stamp: stamp } = match self.idle.pop() {
             Some(staging) => staging,
-            None => Staging { buffer: Arc::new(self.staging(device)), next_stamp: 0 },
+            None => {
+                let buffer = Arc::new(self.staging(device));
+                Staging { buffer, room: self.bytes, next_stamp: 0 }
+            }
         };
         let mut at = 0;
         for &(source, offset, size) in parts.iter().filter(|part| part.2 > 0) {
@@ -151,7 +164,7 @@ impl ReadbackRing {
         let stamps = || Arc::new(stamps(&self.ledger, device));
         let stamps = Arc::clone(self.stamps.get_or_insert_with(stamps));
         let from = stamp as u64 * WORD_BYTES;
-        encoder.copy_buffer_to_buffer(&stamps, from, &buffer, self.bytes, WORD_BYTES);
+        encoder.copy_buffer_to_buffer(&stamps, from, &buffer, room, WORD_BYTES);
         let state = AtomicU8::new(state::RECORDED);
         let slot = Arc::new(Slot { buffer, _stamps: stamps, state });
         let handle = wgpu::Buffer::clone(&slot.buffer);
@@ -160,7 +173,7 @@ impl ReadbackRing {
             let outcome = if mapped.is_ok() { state::MAPPED } else { state::NOT_MAPPED };
             report.0.state.store(outcome, Ordering::Release);
         });
-        self.in_flight.push_back(Record { tag, bytes, stamp, slot });
+        self.in_flight.push_back(Record { tag, bytes, room, stamp, slot });
         true
     }
 
@@ -195,12 +208,15 @@ impl ReadbackRing {
             }
         };
         buffer.unmap();
-        let (bytes, stamp) = mapped.split_at(self.bytes.min(mapped.len() as u64) as usize);
+        let (bytes, stamp) = mapped.split_at(record.room.min(mapped.len() as u64) as usize);
         if stamp != STAMPS[record.stamp].to_le_bytes() {
             return Err(Lost::NotRun);
         }
-        let next_stamp = (record.stamp + 1) % STAMPS.len();
-        self.idle.push(Staging { buffer: Arc::clone(buffer), next_stamp });
+        if record.room == self.bytes {
+            let (buffer, room) = (Arc::clone(buffer), record.room);
+            let next_stamp = (record.stamp + 1) % STAMPS.len();
+            self.idle.push(Staging { buffer, room, next_stamp });
+        }
         Ok(bytes[..bytes.len().min(record.bytes as usize)].to_vec())
     }
 

@@ -8,7 +8,7 @@ use infill::cpu::reproject::{self, EMPTY, OldHit};
 use infill::{Sources, Weights};
 use macrocell::Grid;
 use progressive_iso::{
-    Camera, Capture, Completeness, Frame, FrameOptions, FrameView, Infill, InfillOptions,
+    Camera, Capture, Completeness, Error, Frame, FrameOptions, FrameView, Infill, InfillOptions,
     PassReport, PixelStatus, ProgressiveIsoRenderer, RendererOptions,
 };
 use wavefront::cpu::frame::{FrameRay, RayStates};
@@ -374,8 +374,7 @@ fn what_was_not_planned_is_refused() {
     let scene = Scene::generated("gyroid", [20, 20, 20], 8.0);
     let mut without = gpu.renderer(&scene, options(SIZE));
     let refused = |renderer: &mut ProgressiveIsoRenderer, infill| {
-        renderer.set_frame(&frame_with(&scene, 0.0, infill))
-            == Err(progressive_iso::Error::InfillNotPlanned)
+        renderer.set_frame(&frame_with(&scene, 0.0, infill)) == Err(Error::InfillNotPlanned)
     };
     assert!(refused(&mut without, Infill::Classical));
     let mut classical = gpu.renderer(&scene, with_infill(InfillOptions::default()));
@@ -436,4 +435,28 @@ fn memory_stays_within_the_plan_and_is_nothing_when_off() {
         - bytes(RendererOptions { most_slots: Some(600), ..plain });
     let slack = 64;
     assert!(more >= part(with) && more <= part(with) + slack, "{more} {}", part(with));
+}
+
+#[test]
+fn infill_comes_and_goes_with_the_options() {
+    let (gpu, scene) = (Gpu::new(), Scene::generated("turbulence", [45, 41, 38], 8.0));
+    let (without, with) = (options(SIZE), with_infill(InfillOptions::default()));
+    let [off, filled] = [Infill::Off, Infill::Classical].map(|i| frame_with(&scene, 20.0, i));
+    let mut renderer = gpu.renderer(&scene, without);
+    let expected = gpu.finish(&mut renderer, &off);
+    for _ in 0..2 {
+        renderer.set_options(&gpu.device, with).unwrap();
+        renderer.clear_cache();
+        let report = render_until(&gpu, &mut renderer, &filled, 0.5);
+        assert!(report.filled_pixels > 500 && !report.complete(), "{report:?}");
+        let refused = renderer.set_options(&gpu.device, without);
+        assert!(matches!(refused, Err(Error::InfillNotPlanned)), "the frame needs it: {refused:?}");
+        assert_eq!(gpu.finish(&mut renderer, &off).color, expected.color);
+        renderer.set_options(&gpu.device, without).unwrap();
+        assert!(matches!(renderer.set_frame(&filled), Err(Error::InfillNotPlanned)));
+        assert_eq!(gpu.finish(&mut renderer, &off).color, expected.color);
+        let report = renderer.poll_report();
+        assert_eq!(report.filled_pixels, 0);
+        assert!(report.bytes <= renderer.plan().rendering_bytes(), "{report:?}");
+    }
 }

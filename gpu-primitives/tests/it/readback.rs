@@ -73,6 +73,25 @@ fn too_large_a_record_is_refused() {
 }
 
 #[test]
+fn records_of_another_size_leave_those_in_flight_alone() {
+    let (device, queue) = &own_device();
+    let ledger = Ledger::new();
+    let mut ring = ReadbackRing::new(&ledger, "test", 4, 2);
+    let source = words(device, &[1, 2, 3]);
+    for size in [12, 8, 4] {
+        let mut encoder = encoder(device);
+        assert!(ring.record(device, &mut encoder, &[(&source, 0, 4)], size));
+        ring.set_bytes(size);
+        assert!(ring.record(device, &mut encoder, &[(&source, 0, size)], 0));
+        gpu::submit_and_wait(device, queue, encoder);
+        assert_eq!(ring.take(), Some((size, Ok(bytes(&[1])))));
+        let all = bytes(&[1, 2, 3]);
+        assert_eq!(ring.take(), Some((0, Ok(all[..size as usize].to_vec()))));
+        assert_eq!(ledger.total(), 8 + size + 4, "one staging buffer and the stamps");
+    }
+}
+
+#[test]
 fn a_dropped_encoder_loses_only_its_record() {
     let (device, queue) = &own_device();
     let ledger = Ledger::new();
