@@ -37,6 +37,8 @@ pub struct InfillOptions {
     pub sources: Sources,
     /// Weights of the network, for [`Infill::Network`].
     pub network: Option<&'static Weights>,
+    /// What [`FrameOptions::guided`] needs; nothing where the whole volume is resident.
+    pub guided: bool,
 }
 
 /// What shows where a pixel is unfinished.
@@ -138,6 +140,10 @@ pub struct FrameOptions {
     pub infill: Infill,
     /// Whether filled pixels show either surface or background; else their colour is a mixture of both.
     pub crisp_infill: bool,
+    /// Whether rays request everything on their way to where the coarse field is crossed, beside what they need and
+    /// look ahead to. The finished picture is the same. Needs [`InfillOptions::guided`]; for tests of guesses by
+    /// [`Infill`] and for itself.
+    pub guided: bool,
     /// Completeness that is enough: from then on reports are [`crate::PassReport::stopped`] and pixels are filled,
     /// not before. Passes that are called for all the same go on. `None`: pixels are filled after every pass.
     pub stop_at: Option<Completeness>,
@@ -152,6 +158,7 @@ impl Default for FrameOptions {
             look_ahead: 2,
             infill: Infill::Off,
             crisp_infill: false,
+            guided: false,
             stop_at: None,
         }
     }

@@ -154,7 +154,8 @@ impl ProgressiveIsoRenderer {
             Infill::Classical => planned.is_some(),
             Infill::Network => planned.is_some_and(|plan| plan.network()),
         };
-        if !possible {
+        let guided = self.options.infill.is_some_and(|infill| infill.guided);
+        if !possible || frame.options.guided && !guided {
             return Err(Error::InfillNotPlanned);
         }
         let view = self.view(frame)?;
@@ -362,7 +363,7 @@ impl ProgressiveIsoRenderer {
             state.rounds += 1;
             let _span =
                 tracing::debug_span!("progressive_iso.round", round = state.rounds).entered();
-            rendering.record_round(encoder, &self.stages);
+            rendering.record_round(encoder, &self.stages, options.guided);
         }
         match options.infill {
             Infill::Off => {}
@@ -401,7 +402,7 @@ impl ProgressiveIsoRenderer {
             state.view.params(grid, lru, isovalue, look_ahead).with_most_cells(state.most_cells);
         let shading = ShadingParams::new(&frame.options.shading, self.volume.world_from_index);
         let next = (&state.view, &params);
-        if frame.options.infill != Infill::Off {
+        if frame.options.infill != Infill::Off || frame.options.guided {
             let follows = self.shown_isovalue == Some(isovalue);
             let look = infill::Look {
                 from_completeness: frame.options.stop_at.map_or(0.0, |stop| stop.0),

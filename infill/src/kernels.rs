@@ -41,6 +41,7 @@ macro_rules! entry {
 
 const SCATTER: Module = entry!("scatter");
 const GATE: Module = entry!("gate");
+const GUIDE: Module = entry!("guide");
 const MARK: Module = entry!("mark");
 const TILES: Module = entry!("tiles");
 const TILE_ARGS: Module = entry!("tile_args");
@@ -161,12 +162,25 @@ pub(crate) fn guess(plan: &InfillPlan) -> KernelSource {
     if sources.coarse_field {
         constants.push(("COARSE_FIELD", Constant::Bool(true)));
         constants.push(("COARSE_BINDING", next(&bindings)));
-        constants.push(("CODE_PAGES_2", Constant::Bool(plan.code_pages() >= 2)));
-        constants.push(("CODE_PAGES_3", Constant::Bool(plan.code_pages() >= 3)));
+        constants.extend(code_page_constants(plan));
         bindings.push(PAIRS);
         bindings.extend(vec![READ; plan.code_pages()]);
     }
     source("infill.guess", GUESS, bindings, &constants)
+}
+
+pub(crate) fn guide(plan: &InfillPlan) -> KernelSource {
+    let masks = PAIRS;
+    let mut bindings = vec![FRAME, PARAMS, READ, masks, READ_WRITE, READ_WRITE, PAIRS];
+    bindings.extend(vec![READ; plan.code_pages()]);
+    source("infill.guide", GUIDE, bindings, &code_page_constants(plan))
+}
+
+fn code_page_constants(plan: &InfillPlan) -> [(&'static str, Constant); 2] {
+    [
+        ("CODE_PAGES_2", Constant::Bool(plan.code_pages() >= 2)),
+        ("CODE_PAGES_3", Constant::Bool(plan.code_pages() >= 3)),
+    ]
 }
 
 /// First vector of a layer's weights.

@@ -234,6 +234,11 @@ impl InfillBuffers {
         (&self.tiles, 12, 4)
     }
 
+    /// The picture's parameters.
+    pub(crate) fn params(&self) -> wgpu::BindingResource<'_> {
+        self.params.as_entire_binding()
+    }
+
     /// Words of the candidates of the holes, three for a pixel: for tests.
     pub fn candidates(&self) -> &wgpu::Buffer {
         &self.candidates

@@ -5,7 +5,7 @@
 use gpu_primitives::kernel::{Binding, KernelSource};
 use gpu_testkit::gpu;
 use gpu_testkit::layout::{self, BindingKind};
-use infill::{Infill, InfillPlan, Sources};
+use infill::{Guide, Infill, InfillPlan, Sources};
 use macrocell::MacrocellPlan;
 
 fn kind(binding: &Binding) -> BindingKind {
@@ -50,6 +50,7 @@ fn kernels_validate_with_every_set_of_sources() {
                 let plan = plan.unwrap();
                 assert_eq!(plan.sources(), sources);
                 Infill::sources(&plan).iter().for_each(check);
+                Guide::source(&plan).iter().for_each(check);
             }
         }
     }
