@@ -3,6 +3,8 @@
 use infill::{Sources, Weights};
 use wavefront::{Camera, DrawTarget, Outputs, Shading};
 
+use crate::Error;
+
 /// How rays find the surface. All strategies make the same picture, bit for bit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
@@ -37,6 +39,8 @@ pub struct InfillOptions {
     pub sources: Sources,
     /// Weights of the network, for [`Infill::Network`].
     pub network: Option<&'static Weights>,
+    /// What [`FrameOptions::guided`] needs; nothing where the whole volume is resident.
+    pub guided: bool,
 }
 
 /// What shows where a pixel is unfinished.
@@ -105,6 +109,18 @@ impl RendererOptions {
         Outputs { depth, normal: self.outputs.normal || infill, ..self.outputs }
     }
 
+    /// Whether a frame may be filled and guided as it asks.
+    pub(crate) fn check_frame(&self, frame: &FrameOptions) -> Result<(), Error> {
+        let infill = self.infill;
+        let filled = match frame.infill {
+            Infill::Off => true,
+            Infill::Classical => infill.is_some(),
+            Infill::Network => infill.is_some_and(|infill| infill.network.is_some()),
+        };
+        let guided = !frame.guided || infill.is_some_and(|infill| infill.guided);
+        if filled && guided { Ok(()) } else { Err(Error::InfillNotPlanned) }
+    }
+
     /// What pictures there are and where they go.
     pub(crate) fn pictures(&self) -> (Outputs, Option<DrawTarget>) {
         (self.all_outputs(), self.draw_target)
@@ -143,6 +159,10 @@ pub struct FrameOptions {
     pub infill: Infill,
     /// Whether filled pixels show either surface or background; else their colour is a mixture of both.
     pub crisp_infill: bool,
+    /// Whether rays request everything on their way to where the coarse field is crossed, beside what they need and
+    /// look ahead to. The finished picture is the same. Needs [`InfillOptions::guided`]; for tests of guesses by
+    /// [`Infill`] and for itself.
+    pub guided: bool,
     /// Completeness that is enough: from then on reports are [`crate::PassReport::stopped`] and pixels are filled,
     /// not before. Passes that are called for all the same go on. `None`: pixels are filled after every pass.
     pub stop_at: Option<Completeness>,
@@ -157,6 +177,7 @@ impl Default for FrameOptions {
             look_ahead: 2,
             infill: Infill::Off,
             crisp_infill: false,
+            guided: false,
             stop_at: None,
         }
     }

@@ -15,7 +15,7 @@ use crate::records::{CONTROL_BYTES, PASSES_IN_FLIGHT, readback_bytes};
 use crate::samples::SamplePlan;
 use crate::schedule::FIRST_CELLS;
 use crate::strategy::StrategyPlan;
-use crate::{CompressedVolume, Error, Infill, RendererOptions, Residency, capture, wgpu};
+use crate::{CompressedVolume, Error, RendererOptions, Residency, capture, wgpu};
 
 /// Largest upload chunk of a frame's parameters.
 pub(crate) const PARAMS_CHUNK: u64 = 1024;
@@ -176,17 +176,6 @@ impl ScenePlan {
     #[must_use]
     pub fn slots(&self) -> u64 {
         self.samples.slots()
-    }
-
-    /// Whether a frame may be filled so.
-    pub(crate) fn check_infill(&self, infill: Infill) -> Result<(), Error> {
-        let planned = self.infill.as_ref();
-        let possible = match infill {
-            Infill::Off => true,
-            Infill::Classical => planned.is_some(),
-            Infill::Network => planned.is_some_and(InfillPlan::network),
-        };
-        if possible { Ok(()) } else { Err(Error::InfillNotPlanned) }
     }
 
     /// [`Residency::Cached`] or [`Residency::Full`].

@@ -151,7 +151,7 @@ impl ProgressiveIsoRenderer {
         if !isovalue.is_finite() || isovalue.abs() > LARGEST_VALUE {
             return Err(Error::Isovalue { found: isovalue });
         }
-        self.plan.check_infill(frame.options.infill)?;
+        self.options.check_frame(&frame.options)?;
         let view = self.view(frame)?;
         self.frame_count += 1;
         self.frame = Some(FrameState {
@@ -357,7 +357,7 @@ impl ProgressiveIsoRenderer {
             state.rounds += 1;
             let _span =
                 tracing::debug_span!("progressive_iso.round", round = state.rounds).entered();
-            rendering.record_round(encoder, &self.stages);
+            rendering.record_round(encoder, &self.stages, options.guided);
         }
         match options.infill {
             Infill::Off => {}
@@ -396,7 +396,7 @@ impl ProgressiveIsoRenderer {
             state.view.params(grid, lru, isovalue, look_ahead).with_most_cells(state.most_cells);
         let shading = ShadingParams::new(&frame.options.shading, self.volume.world_from_index);
         let next = (&state.view, &params);
-        if frame.options.infill != Infill::Off {
+        if frame.options.infill != Infill::Off || frame.options.guided {
             let follows = self.shown_isovalue == Some(isovalue);
             let look = infill::Look {
                 from_completeness: frame.options.stop_at.map_or(0.0, |stop| stop.0),
@@ -530,8 +530,9 @@ impl ProgressiveIsoRenderer {
         options: RendererOptions,
     ) -> Result<(), Error> {
         let plan = self.replan(&options)?;
-        let infill = self.frame.as_ref().map(|state| state.frame.options.infill);
-        plan.check_infill(infill.unwrap_or_default())?;
+        if let Some(state) = &self.frame {
+            options.check_frame(&state.frame.options)?;
+        }
         let pictures = self.options.pictures() != options.pictures();
         let (layout, strategy) = (plan.samples.layout(), plan.strategy);
         if pictures

@@ -2,11 +2,11 @@
 
 use gpu_primitives::memory::Ledger;
 use gpu_primitives::upload::UploadRing;
-use infill::{InfillBuffers, Method, Weights};
+use infill::{Guide, GuideBinds, GuideScene, InfillBuffers, Method, Weights};
 use macrocell::{Activate, Masks, RangeBuffers};
 use wavefront::{
-    Draw, DrawBuffers, FrameParams, FrameView, OutputTextures, RayBuffers, Rays, Rounds, Scene,
-    ShadingParams, Strategy,
+    Draw, DrawBuffers, FrameParams, FrameView, OutputTextures, RayBuffers, Rays, Rounds, Samples,
+    Scene, ShadingParams, Strategy,
 };
 use zfp_gpu::Payload;
 
@@ -29,6 +29,7 @@ pub(crate) struct Stages {
 pub(crate) struct InfillStage {
     pub(crate) stage: infill::Infill,
     weights: Option<&'static Weights>,
+    guide: Option<Guide>,
 }
 
 /// The volume as it is needed all the time.
@@ -53,6 +54,7 @@ pub(crate) struct Rendering {
     rays: RayBuffers,
     rounds: Box<dyn Rounds>,
     infill: Option<InfillBuffers>,
+    guide: Option<GuideBinds>,
 }
 
 impl Stages {
@@ -72,6 +74,9 @@ impl Stages {
             infill: plan.infill.as_ref().map(|plan| InfillStage {
                 stage: infill::Infill::new(device, plan),
                 weights: options.infill.and_then(|infill| infill.network),
+                guide: (options.infill.is_some_and(|infill| infill.guided) && !layout.resident)
+                    .then(|| Guide::new(device, plan))
+                    .flatten(),
             }),
         })
     }
@@ -152,10 +157,20 @@ impl Rendering {
         let scene = Scene { rays: &rays, masks, samples: read };
         let rounds = stages.strategy.bind(device, ledger, scene)?;
         let scene = infill::Scene { rays: &rays, ranges: &volume.ranges, textures };
-        let infill = stages.infill.as_ref().map(|InfillStage { stage, weights }| {
+        let infill = stages.infill.as_ref().map(|InfillStage { stage, weights, .. }| {
             InfillBuffers::new(device, ledger, stage, scene, *weights)
         });
-        Ok(Self { infill: infill.transpose()?, samples, rays, rounds })
+        let infill = infill.transpose()?;
+        let guide = stages.infill.as_ref().and_then(|infill| infill.guide.as_ref());
+        let guide = match (guide, &infill, read) {
+            (Some(guide), Some(buffers), Samples::Cached(cache)) => {
+                let cache = [cache.directory(), cache.state()];
+                let scene = GuideScene { rays: &rays, masks, ranges: &volume.ranges, cache };
+                Some(guide.bind(device, buffers, scene))
+            }
+            _ => None,
+        };
+        Ok(Self { samples, rays, rounds, infill, guide })
     }
 
     /// Records the first rays of a frame.
@@ -205,9 +220,19 @@ impl Rendering {
         self.infill.as_ref().map(InfillBuffers::filled)
     }
 
-    /// Records one round.
-    pub(crate) fn record_round(&self, encoder: &mut wgpu::CommandEncoder, stages: &Stages) {
+    /// Records one round; `guided`: with requests up to where the coarse field is crossed.
+    pub(crate) fn record_round(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        stages: &Stages,
+        guided: bool,
+    ) {
+        let guide = stages.infill.as_ref().and_then(|infill| infill.guide.as_ref());
+        let guide = guide.zip(self.guide.as_ref()).filter(|_| guided);
         self.rounds.record_round(encoder, &stages.rays, &self.rays, &mut |encoder| {
+            if let Some((guide, binds)) = guide {
+                guide.record(encoder, binds, &self.rays);
+            }
             self.samples.record_service(encoder, &stages.samples);
         });
     }

@@ -167,7 +167,8 @@ pub fn check_bindings(
 fn parse(source: &str) -> Result<(Module, ModuleInfo), String> {
     let module =
         naga::front::wgsl::parse_str(source).map_err(|error| error.emit_to_string(source))?;
-    let info = Validator::new(ValidationFlags::all(), Capabilities::empty())
+    // Packing halves, which all of WebGPU has, is a capability of its own to naga.
+    let info = Validator::new(ValidationFlags::all(), Capabilities::SHADER_FLOAT16_IN_FLOAT32)
         .validate(&module)
         .map_err(|error| error.emit_to_string(source))?;
     Ok((module, info))

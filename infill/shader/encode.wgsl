@@ -17,25 +17,9 @@
 #endif
 
 const LIST: u32 = 2u;
-
-// The features of a texel are made once, for all four groups.
-fn load_features(corner: vec2<u32>, lane: u32) {
-    for (var i = lane; i < CONV_HALO * CONV_HALO; i += CONV_LANES) {
-        let texel = vec2<i32>(corner + vec2<u32>(i % CONV_HALO, i / CONV_HALO)) - vec2<i32>(1);
-        var features = array<vec4<f32>, 4>();
-        if (infill_inside(params, texel)) {
-            features = features_at(vec2<u32>(texel));
-        }
-        for (var group = 0u; group < CONV_IN; group++) {
-            conv_tile[CONV_IN * i + group] = conv_pack(features[group]);
-        }
-    }
-    workgroupBarrier();
-}
-
-fn conv_input(texel: vec2<i32>, group: u32) -> vec4<f32> {
-    return vec4<f32>(0.0);
-}
+const HALO: u32 = INFILL_TILE + 2u;
+const GROUPS: u32 = 4u;
+const CONV_MEMORY: u32 = HALO * HALO * GROUPS;
 
 @compute @workgroup_size(CONV_LANES)
 fn main(
@@ -46,13 +30,23 @@ fn main(
     let index = indirect_linear_group(group, groups);
     let listed = index < tiles[LIST];
     let corner = infill_tile_corner(params, tiles[infill_list_word(params, LIST, select(0u, index, listed))]);
-    load_features(corner, lane);
-    for (var i = lane; i < CONV_EDGE * CONV_EDGE; i += CONV_LANES) {
-        let inside = vec2<u32>(i % CONV_EDGE, i / CONV_EDGE);
+    for (var i = lane; i < HALO * HALO; i += CONV_LANES) {
+        let pixel = vec2<i32>(corner + vec2<u32>(i % HALO, i / HALO)) - vec2<i32>(1);
+        var features = array<vec4<f32>, GROUPS>();
+        if (infill_inside(params, pixel)) {
+            features = features_at(vec2<u32>(pixel));
+        }
+        for (var channels = 0u; channels < GROUPS; channels++) {
+            conv_memory[GROUPS * i + channels] = conv_pack(features[channels]);
+        }
+    }
+    workgroupBarrier();
+    for (var i = lane; i < INFILL_TILE * INFILL_TILE; i += CONV_LANES) {
+        let inside = vec2<u32>(i % INFILL_TILE, i / INFILL_TILE);
         let texel = corner + inside;
         if (listed && all(texel < params.padded)) {
-            let value = max(conv_output(inside, 0u), vec4<f32>(0.0));
-            outputs[texel.x + params.padded.x * texel.y] = conv_pack(value);
+            let value = conv_output(ConvTexels(0u, HALO, GROUPS), inside, FIRST_WEIGHTS, 1u, 0u);
+            outputs[texel.x + params.padded.x * texel.y] = value;
         }
     }
 }

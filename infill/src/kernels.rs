@@ -18,7 +18,7 @@ macro_rules! modules {
 }
 
 /// What kernels of this crate import from it.
-const LIBRARY: [Module; 11] = modules![
+const LIBRARY: [Module; 12] = modules![
     infill_params = "infill_params.wgsl",
     infill_rays = "infill_rays.wgsl",
     candidate = "candidate.wgsl",
@@ -29,6 +29,7 @@ const LIBRARY: [Module; 11] = modules![
     history = "history.wgsl",
     features = "features.wgsl",
     conv = "conv.wgsl",
+    decode = "decode.wgsl",
     mix = "mix.wgsl",
 ];
 
@@ -40,13 +41,14 @@ macro_rules! entry {
 
 const SCATTER: Module = entry!("scatter");
 const GATE: Module = entry!("gate");
+const GUIDE: Module = entry!("guide");
 const MARK: Module = entry!("mark");
 const TILES: Module = entry!("tiles");
 const TILE_ARGS: Module = entry!("tile_args");
 const PUSH: Module = entry!("push");
 const GUESS: Module = entry!("guess");
 const ENCODE: Module = entry!("encode");
-const LAYER: Module = entry!("layer");
+const PAIR: Module = entry!("pair");
 const FILL: Module = entry!("fill");
 
 /// Uniform struct `InfillParams` of `shader/lib/infill_params.wgsl`.
@@ -87,44 +89,21 @@ const TEXTURE: Binding =
     Binding::TextureSample { sample: wgpu::TextureSampleType::Float { filterable: false } };
 const COLOR: Binding = Binding::TextureWrite { format: wgpu::TextureFormat::Rgba8Unorm };
 
-/// One convolution of the coarser levels.
+/// Two convolutions of a coarser level.
 #[derive(Clone, Copy, Debug)]
-struct Stage {
-    /// Which of [`LAYERS`].
-    layer: usize,
+struct Pair {
     label: &'static str,
+    /// The first of the two among [`LAYERS`].
+    layer: usize,
     /// 1 for halves, 2 for quarters.
     level: u32,
-    /// Whether it reads averages of the finer level.
-    pooled: bool,
-    /// Groups of channels that are its own level's, if the others are the coarser one's.
-    own_groups: Option<u32>,
-    /// List of tiles.
-    list: u32,
 }
 
-const fn stage(
-    layer: usize,
-    label: &'static str,
-    level: u32,
-    pooled: bool,
-    own_groups: Option<u32>,
-    list: u32,
-) -> Stage {
-    Stage { layer, label, level, pooled, own_groups, list }
-}
-
-/// The convolutions between the first and the last one.
-const STAGES: [Stage; 5] = [
-    stage(1, "infill.e1a", 1, true, None, 2),
-    stage(2, "infill.e1b", 1, false, None, 2),
-    stage(3, "infill.e2a", 2, true, None, 2),
-    stage(4, "infill.e2b", 2, false, None, 2),
-    stage(5, "infill.d1", 1, false, Some(2), 1),
+/// The convolutions of the coarser levels on the way down.
+const PAIRS_OF_LAYERS: [Pair; 2] = [
+    Pair { label: "infill.halves", layer: 1, level: 1 },
+    Pair { label: "infill.quarters", layer: 3, level: 2 },
 ];
-
-/// The list of tiles of every layer of [`layers`].
-pub(crate) const LAYER_LISTS: [u32; 5] = [2, 2, 2, 2, 1];
 
 fn source(
     label: &'static str,
@@ -183,49 +162,55 @@ pub(crate) fn guess(plan: &InfillPlan) -> KernelSource {
     if sources.coarse_field {
         constants.push(("COARSE_FIELD", Constant::Bool(true)));
         constants.push(("COARSE_BINDING", next(&bindings)));
-        constants.push(("CODE_PAGES_2", Constant::Bool(plan.code_pages() >= 2)));
-        constants.push(("CODE_PAGES_3", Constant::Bool(plan.code_pages() >= 3)));
+        constants.extend(code_page_constants(plan));
         bindings.push(PAIRS);
         bindings.extend(vec![READ; plan.code_pages()]);
     }
     source("infill.guess", GUESS, bindings, &constants)
 }
 
-/// Constants of a convolution for `shader/lib/conv.wgsl`.
-fn conv_constants(layer: usize, edge: u32) -> Vec<(&'static str, Constant)> {
-    let Layer { inputs, outputs, .. } = LAYERS[layer];
-    vec![
-        ("CONV_EDGE", Constant::U32(edge)),
-        ("CONV_IN", Constant::U32(inputs.div_ceil(4) as u32)),
-        ("CONV_OUT", Constant::U32(outputs.div_ceil(4) as u32)),
-        ("CONV_WEIGHTS", Constant::U32(PackedWeights::first()[layer])),
+pub(crate) fn guide(plan: &InfillPlan) -> KernelSource {
+    let masks = PAIRS;
+    let mut bindings = vec![FRAME, PARAMS, READ, masks, READ_WRITE, READ_WRITE, PAIRS];
+    bindings.extend(vec![READ; plan.code_pages()]);
+    source("infill.guide", GUIDE, bindings, &code_page_constants(plan))
+}
+
+fn code_page_constants(plan: &InfillPlan) -> [(&'static str, Constant); 2] {
+    [
+        ("CODE_PAGES_2", Constant::Bool(plan.code_pages() >= 2)),
+        ("CODE_PAGES_3", Constant::Bool(plan.code_pages() >= 3)),
     ]
+}
+
+/// First vector of a layer's weights.
+fn weights(layer: usize) -> Constant {
+    Constant::U32(PackedWeights::first()[layer])
 }
 
 pub(crate) fn encode(plan: &InfillPlan) -> KernelSource {
     let mut bindings = vec![FRAME, SHADING, PARAMS, READ, READ, READ, PAIRS, PAIRS_WRITE, TEXTURE];
-    let mut constants = conv_constants(0, 16);
+    let mut constants = vec![("FIRST_WEIGHTS", weights(0))];
     if plan.sources().history {
         constants.push(("HISTORY", Constant::Bool(true)));
         bindings.push(READ);
     }
-    source("infill.e0", ENCODE, bindings, &constants)
+    source("infill.encode", ENCODE, bindings, &constants)
 }
 
-/// The convolutions between the first and the last one.
-pub(crate) fn layers() -> [KernelSource; 5] {
-    STAGES.map(|stage| {
-        let mut bindings = vec![PARAMS, READ, PAIRS, PAIRS, PAIRS_WRITE];
-        let mut constants = conv_constants(stage.layer, 16 >> stage.level);
-        constants.push(("LEVEL", Constant::U32(stage.level)));
-        constants.push(("LIST", Constant::U32(stage.list)));
-        constants.push(("POOLED", Constant::Bool(stage.pooled)));
-        if let Some(groups) = stage.own_groups {
-            constants.push(("JOINED", Constant::Bool(true)));
-            constants.push(("OWN_GROUPS", Constant::U32(groups)));
-            bindings.push(PAIRS);
-        }
-        source(stage.label, LAYER, bindings, &constants)
+/// Halves, then quarters.
+pub(crate) fn pairs() -> [KernelSource; 2] {
+    PAIRS_OF_LAYERS.map(|Pair { label, layer, level }| {
+        let groups = |channels: usize| Constant::U32(channels.div_ceil(4) as u32);
+        let Layer { inputs, outputs, .. } = LAYERS[layer];
+        let constants = [
+            ("LEVEL", Constant::U32(level)),
+            ("GROUPS_IN", groups(inputs)),
+            ("GROUPS_OUT", groups(outputs)),
+            ("FIRST_WEIGHTS", weights(layer)),
+            ("SECOND_WEIGHTS", weights(layer + 1)),
+        ];
+        source(label, PAIR, vec![PARAMS, READ, PAIRS, PAIRS, PAIRS_WRITE], &constants)
     })
 }
 
@@ -243,11 +228,12 @@ pub(crate) fn fill(plan: &InfillPlan, network: bool) -> KernelSource {
         bindings.push(READ);
     }
     if network {
-        constants.extend(conv_constants(6, 16));
-        constants.push(("HEAD_WEIGHTS", Constant::U32(PackedWeights::first()[7])));
+        constants.push(("HALF_WEIGHTS", weights(5)));
+        constants.push(("LAST_WEIGHTS", weights(6)));
+        constants.push(("HEAD_WEIGHTS", weights(7)));
         constants.push(("NETWORK", Constant::Bool(true)));
         constants.push(("NETWORK_BINDING", next(&bindings)));
-        bindings.extend([PAIRS; 3]);
+        bindings.extend([PAIRS; 4]);
     }
     let label = if network { "infill.fill.network" } else { "infill.fill.classical" };
     source(label, FILL, bindings, &constants)

@@ -2,6 +2,7 @@
 
 pub mod cpu;
 mod error;
+mod guide;
 mod kernels;
 #[cfg(test)]
 mod layout_tests;
@@ -12,6 +13,7 @@ pub mod weights;
 
 pub use error::Error;
 pub use gpu_primitives::wgpu;
+pub use guide::{Guide, GuideBinds, GuideScene};
 pub use options::{Look, PRIOR, Source, Sources};
 pub use plan::InfillPlan;
 pub use stage::{Infill, InfillBuffers, Method, Scene};

@@ -174,7 +174,7 @@ impl InfillPlan {
             + self.history_bytes()
             + history
             + self.shared_bytes()
-            + 2 * self.map_bytes(1, 2)
+            + self.map_bytes(1, 2)
             + self.map_bytes(2, 3)
             + weights
             + size_of::<InfillParams>() as u64

@@ -9,7 +9,7 @@ use macrocell::RangeBuffers;
 use wavefront::{FrameParams, FrameView, OutputTextures, RayBuffers};
 
 use crate::Error;
-use crate::kernels::{self, InfillParams, LAYER_LISTS, ScatterParams};
+use crate::kernels::{self, InfillParams, ScatterParams};
 use crate::options::Look;
 use crate::plan::{ARGS_BYTES, GATE_BYTES, InfillPlan};
 use crate::weights::{PackedWeights, Weights};
@@ -44,7 +44,7 @@ pub struct Infill {
 #[derive(Debug)]
 struct NetworkKernels {
     encode: Kernel,
-    layers: [Kernel; 5],
+    pairs: [Kernel; 2],
     fill: Kernel,
 }
 
@@ -81,7 +81,7 @@ struct History {
 #[derive(Debug)]
 struct NetworkBinds {
     encode: wgpu::BindGroup,
-    layers: [wgpu::BindGroup; 5],
+    pairs: [wgpu::BindGroup; 2],
     fill: wgpu::BindGroup,
 }
 
@@ -113,7 +113,7 @@ impl Infill {
             classical: make(kernels::fill(plan, false)),
             network: plan.network().then(|| NetworkKernels {
                 encode: make(kernels::encode(plan)),
-                layers: kernels::layers().map(make),
+                pairs: kernels::pairs().map(make),
                 fill: make(kernels::fill(plan, true)),
             }),
         }
@@ -129,7 +129,7 @@ impl Infill {
         all.extend([kernels::guess(plan), kernels::fill(plan, false)]);
         if plan.network() {
             all.push(kernels::encode(plan));
-            all.extend(kernels::layers());
+            all.extend(kernels::pairs());
             all.push(kernels::fill(plan, true));
         }
         all
@@ -199,10 +199,8 @@ impl Infill {
                 {
                     let mut pass = begin_pass(encoder, "infill.network");
                     over(&mut pass, &kernels.encode, &binds.encode, 2);
-                    for ((kernel, bind), list) in
-                        kernels.layers.iter().zip(&binds.layers).zip(LAYER_LISTS)
-                    {
-                        over(&mut pass, kernel, bind, list);
+                    for (kernel, bind) in kernels.pairs.iter().zip(&binds.pairs) {
+                        over(&mut pass, kernel, bind, 2);
                     }
                 }
                 let mut pass = begin_pass(encoder, "infill.fill");
@@ -236,6 +234,11 @@ impl InfillBuffers {
         (&self.tiles, 12, 4)
     }
 
+    /// The picture's parameters.
+    pub(crate) fn params(&self) -> wgpu::BindingResource<'_> {
+        self.params.as_entire_binding()
+    }
+
     /// Words of the candidates of the holes, three for a pixel: for tests.
     pub fn candidates(&self) -> &wgpu::Buffer {
         &self.candidates
@@ -258,10 +261,8 @@ struct Maker<'a> {
 /// Memory of the network.
 struct Maps {
     weights: Buffer,
-    /// Of halves: skip, and what is read once.
-    skip: Buffer,
-    half: Buffer,
-    quarter: Buffer,
+    halves: Buffer,
+    quarters: Buffer,
 }
 
 impl Maker<'_> {
@@ -360,14 +361,14 @@ impl Maker<'_> {
                 ]);
                 encode.extend(keys);
                 let mut last = fill.clone();
-                let inputs = [&maps.weights, &shared, &maps.half];
+                let inputs = [&maps.weights, &shared, &maps.halves, &maps.quarters];
                 last.extend(inputs.map(|buffer| buffer.as_entire_binding()));
                 let binds = NetworkBinds {
-                    encode: bind(&kernels.encode, "infill.e0", &encode),
-                    layers: self.layers(kernels, &maps, [&params, &tiles, &shared]),
+                    encode: bind(&kernels.encode, "infill.encode", &encode),
+                    pairs: self.pairs(kernels, &maps, [&params, &tiles, &shared]),
                     fill: bind(&kernels.fill, "infill.fill.network", &last),
                 };
-                scratch.extend([maps.weights, maps.skip, maps.half, maps.quarter]);
+                scratch.extend([maps.weights, maps.halves, maps.quarters]);
                 Some(binds)
             }
         };
@@ -437,33 +438,24 @@ impl Maker<'_> {
         let ledger = self.ledger;
         Maps {
             weights: ledger.buffer_with(self.device, category, "infill.weights", usage, bytes),
-            skip: self.storage("infill.skip", plan.map_bytes(1, 2)),
-            half: self.storage("infill.half", plan.map_bytes(1, 2)),
-            quarter: self.storage("infill.quarter", plan.map_bytes(2, 3)),
+            halves: self.storage("infill.halves", plan.map_bytes(1, 2)),
+            quarters: self.storage("infill.quarters", plan.map_bytes(2, 3)),
         }
     }
 
-    /// The half map holds in turn the outputs of e1a, e2a and d1.
-    fn layers(
+    fn pairs(
         &self,
         kernels: &NetworkKernels,
         maps: &Maps,
-        [params, tiles, first]: [&Buffer; 3],
-    ) -> [wgpu::BindGroup; 5] {
-        let Maps { weights, skip, half, quarter } = maps;
-        let ways: [(&Buffer, &Buffer, Option<&Buffer>); 5] = [
-            (first, half, None),
-            (half, skip, None),
-            (skip, half, None),
-            (half, quarter, None),
-            (skip, half, Some(quarter)),
-        ];
+        [params, tiles, encoded]: [&Buffer; 3],
+    ) -> [wgpu::BindGroup; 2] {
+        let Maps { weights, halves, quarters } = maps;
+        let ways = [(encoded, halves), (halves, quarters)];
         std::array::from_fn(|i| {
-            let (input, output, coarser) = ways[i];
-            let mut buffers = vec![params, tiles, weights, input, output];
-            buffers.extend(coarser);
-            let resources: Vec<_> = buffers.iter().map(|b| b.as_entire_binding()).collect();
-            kernels.layers[i].bind(self.device, "infill.layer", &resources)
+            let (finer, outputs) = ways[i];
+            let buffers = [params, tiles, weights, finer, outputs];
+            let resources = buffers.map(|b| b.as_entire_binding());
+            kernels.pairs[i].bind(self.device, "infill.pair", &resources)
         })
     }
 }

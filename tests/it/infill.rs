@@ -8,8 +8,9 @@ use infill::cpu::reproject::{self, EMPTY, OldHit};
 use infill::{Sources, Weights};
 use macrocell::Grid;
 use progressive_iso::{
-    Camera, Capture, Completeness, Error, Frame, FrameOptions, FrameView, Infill, InfillOptions,
-    PassReport, PixelStatus, ProgressiveIsoRenderer, RendererOptions,
+    BlockSortedOptions, Camera, Capture, Completeness, Error, Frame, FrameOptions, FrameView,
+    Infill, InfillOptions, PassReport, PixelStatus, ProgressiveIsoRenderer, RendererOptions,
+    TraversalStrategy,
 };
 use wavefront::cpu::frame::{FrameRay, RayStates};
 use wavefront::cpu::shading;
@@ -202,7 +203,7 @@ impl Case {
         let gpu = Gpu::new();
         let scene = Scene::generated("turbulence", [70, 66, 61], 8.0);
         let Self { sources, weights, .. } = *self;
-        let options = with_infill(InfillOptions { sources, network: weights });
+        let options = with_infill(InfillOptions { sources, network: weights, guided: false });
         let mut renderer = gpu.renderer(&scene, options);
         let (first, second) = (self.frame(&scene, 20.0), self.frame(&scene, 24.0));
         render_until(&gpu, &mut renderer, &first, 0.6);
@@ -458,5 +459,44 @@ fn infill_comes_and_goes_with_the_options() {
         let report = renderer.poll_report();
         assert_eq!(report.filled_pixels, 0);
         assert!(report.bytes <= renderer.plan().rendering_bytes(), "{report:?}");
+    }
+}
+
+/// The finished picture, the rounds that it took and the blocks that were decoded.
+fn finished(
+    gpu: &Gpu,
+    scene: &Scene,
+    strategy: TraversalStrategy,
+    slots: u64,
+    guided: bool,
+) -> (Capture, [u32; 2]) {
+    let infill = Some(InfillOptions { guided: true, ..Default::default() });
+    let chosen = RendererOptions { strategy, most_slots: Some(slots), infill, ..options(SIZE) };
+    let mut renderer = gpu.renderer(scene, chosen);
+    let mut frame = frame_with(scene, 20.0, Infill::Classical);
+    frame.options.guided = guided;
+    let report = render_until(gpu, &mut renderer, &frame, 2.0);
+    (capture(gpu, &renderer), [report.rounds, report.blocks_decoded])
+}
+
+#[test]
+fn guided_requests_change_no_bit_of_the_finished_picture() {
+    let gpu = Gpu::new();
+    let block_sorted = TraversalStrategy::BlockSorted(BlockSortedOptions::default());
+    for name in ["turbulence", "sheets"] {
+        let scene = Scene::generated(name, [70, 66, 61], 8.0);
+        for strategy in [TraversalStrategy::RunAhead, block_sorted] {
+            for slots in [300, 6000] {
+                let [plain, guided] =
+                    [false, true].map(|guided| finished(&gpu, &scene, strategy, slots, guided));
+                println!(
+                    "{name}, {strategy:?}, {slots} slots: rounds and blocks {:?}, guided {:?}",
+                    plain.1, guided.1
+                );
+                assert!(plain.0 == guided.0);
+                // The guide does ask for more, unless the slots are too few for that.
+                assert!(slots < 1000 || plain.1 != guided.1);
+            }
+        }
     }
 }

@@ -21,7 +21,7 @@ const BLOCK_WALK: Module =
     Module { name: "block_walk", source: include_str!("../shader/lib/block_walk.wgsl") };
 const WORK: Module = Module { name: "work", source: include_str!("../shader/lib/work.wgsl") };
 const LIST: Module = Module { name: "list", source: include_str!("../shader/list.wgsl") };
-const BLOCK_NEED: Module =
+pub(crate) const BLOCK_NEED: Module =
     Module { name: "block_need", source: include_str!("../shader/lib/block_need.wgsl") };
 const START: Module = Module { name: "start", source: include_str!("../shader/start.wgsl") };
 const RESOLVE: Module = Module { name: "resolve", source: include_str!("../shader/resolve.wgsl") };
@@ -285,7 +285,7 @@ impl RayBuffers {
         &self.shading
     }
 
-    /// Words 4, 5 and 6: arguments of a dispatch over all words of active bits, 256 for a workgroup. They give no
+    /// Words 0, 1 and 2: arguments of a dispatch over the listed rays, 64 for a workgroup. Words 4, 5 and 6: arguments of a dispatch over all words of active bits, 256 for a workgroup. They give no
     /// workgroup when no ray is active.
     pub fn active_args(&self) -> &wgpu::Buffer {
         &self.args

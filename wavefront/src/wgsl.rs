@@ -11,9 +11,12 @@ pub const FRAME: Module = rays::FRAME;
 /// Shading of a surface.
 pub const SHADING: Module = outputs::SHADING;
 
+/// Which blocks hold the samples of a ray's cells in a block.
+pub const BLOCK_NEED: Module = rays::BLOCK_NEED;
+
 /// Everything a kernel needs to import from this crate, with what that imports.
 pub fn modules() -> Vec<Module> {
-    let mut modules = vec![FRAME, SHADING];
+    let mut modules = vec![FRAME, SHADING, BLOCK_NEED];
     modules.extend(macrocell::wgsl::MODULES);
     modules.extend(lru_cache_gpu::wgsl::MODULES);
     modules

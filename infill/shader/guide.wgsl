@@ -1,0 +1,88 @@
+// Requests, for every ray that waits, what it needs to walk to where the coarse field is crossed, so that a guess
+// becomes a hit in the next rounds. One invocation per listed ray, after the strategy's own requests.
+#import infill_params
+#import infill_rays
+#import macrocell_skip
+#import lru_request
+#import block_need
+#import march
+#import indirect
+
+@group(0) @binding(0) var<uniform> frame: FrameParams;
+@group(0) @binding(1) var<uniform> params: InfillParams;
+@group(0) @binding(2) var<storage, read> rays: array<u32>;
+@group(0) @binding(3) var<storage, read> masks: array<vec2<u32>>;
+@group(0) @binding(4) var<storage, read_write> lru_directory: array<atomic<u32>>;
+@group(0) @binding(5) var<storage, read_write> lru_state: array<atomic<u32>>;
+@group(0) @binding(6) var<storage, read> coarse_ranges: array<vec2<f32>>;
+@group(0) @binding(7) var<storage, read> codes_0: array<u32>;
+#ifdef CODE_PAGES_2
+@group(0) @binding(8) var<storage, read> codes_1: array<u32>;
+#endif
+#ifdef CODE_PAGES_3
+@group(0) @binding(9) var<storage, read> codes_2: array<u32>;
+#endif
+
+// Active blocks of a ray that are requested at a time.
+const MOST_BLOCKS: u32 = 16u;
+
+fn lru_params() -> LruParams {
+    return frame.lru;
+}
+
+fn macrocell_mask(index: u32) -> vec2<u32> {
+    return masks[index];
+}
+
+// Requests the needed ones of a block and its plus-side neighbours.
+fn request(block: vec3<i32>, need: u32) {
+    for (var rest = need; rest != 0u; rest &= rest - 1u) {
+        let i = countTrailingZeros(rest);
+        let offset = vec3<i32>(vec3<u32>(i & 1u, (i >> 1u) & 1u, i >> 2u));
+        let number = macrocell_linear(block + offset, frame.grid.blocks);
+        if (lru_lookup(number) == LRU_MISSING) {
+            lru_request(number);
+        }
+    }
+}
+
+// The active blocks from where the ray waits to where it crosses the coarse field.
+fn guide(ray: DdaRay, first: vec3<i32>, t_end: f32, most_blocks: u32) {
+    let grid = macrocell_active(frame.grid);
+    var place = macrocell_enter(grid, ray, first);
+    for (var count = 0u; count < most_blocks; count++) {
+        place = macrocell_advance(grid, ray, place);
+        if (!macrocell_inside(grid, place.block) || place.event.t > t_end) {
+            return;
+        }
+        let cell = macrocell_first_cell(grid, ray, place);
+        request(place.block, block_need(ray, cell, macrocell_box(grid, place.block)));
+        place = macrocell_leave(grid, ray, place);
+    }
+}
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let index = indirect_linear_group(group, groups) * 64u + lane;
+    if (index >= rays[RAYS_LISTED]) {
+        return;
+    }
+    let number = rays[frame_list_word(frame, index)];
+    lru_begin_keeping();
+    // Where slots are short, what is fetched ahead would take the place of what is needed.
+    if (lru_uses_count || !infill_is_hole(number)) {
+        return;
+    }
+    let zero = frame_zero(number);
+    let ray = frame_ray(frame, frame_pixel(frame, number)).ray;
+    let t_low = infill_t_low(ray, number);
+    let march = march(ray, infill_volume(), t_low, frame.isovalue, MARCH_MOST_STEPS + zero);
+    if (any(march.hit)) {
+        let first = frame_unpack(frame, rays[RAYS_HEADER + number]);
+        guide(ray, first, select(march.t.y, march.t.x, march.hit.x), MOST_BLOCKS + zero);
+    }
+}

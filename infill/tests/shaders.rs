@@ -1,0 +1,76 @@
+//! Every shader composes, validates and binds what the Rust side says.
+
+#![allow(clippy::unwrap_used, reason = "a failed set-up fails the test")]
+
+use gpu_primitives::kernel::{Binding, KernelSource};
+use gpu_testkit::gpu;
+use gpu_testkit::layout::{self, BindingKind};
+use infill::{Guide, Infill, InfillPlan, Sources};
+use macrocell::MacrocellPlan;
+
+fn kind(binding: &Binding) -> BindingKind {
+    match *binding {
+        Binding::Uniform { bytes } => BindingKind::Uniform { bytes },
+        Binding::StorageRead { min_bytes } => BindingKind::StorageRead { min_bytes },
+        Binding::StorageReadWrite { min_bytes } => BindingKind::StorageReadWrite { min_bytes },
+        Binding::TextureWrite { format } => BindingKind::TextureWrite { format },
+        Binding::TextureSample { sample } => BindingKind::TextureSample { sample },
+    }
+}
+
+fn check(source: &KernelSource) {
+    let text = &source.wgsl.source;
+    layout::validate_wgsl(text).unwrap_or_else(|e| panic!("{}: {e}", source.label));
+    let kinds: Vec<BindingKind> = source.bindings.iter().map(kind).collect();
+    layout::check_bindings(text, source.entry_point, &kinds)
+        .unwrap_or_else(|e| panic!("{}: {e}", source.label));
+}
+
+/// Ranges of a volume of 3x1x1 coarse cells in pages of so many.
+fn ranges(coarse_per_page: u32) -> MacrocellPlan {
+    let limits = wgpu::Limits {
+        max_storage_buffer_binding_size: 128 * u64::from(coarse_per_page),
+        ..wgpu::Limits::default()
+    };
+    MacrocellPlan::new([48, 16, 16], &limits).unwrap()
+}
+
+#[test]
+fn kernels_validate_with_every_set_of_sources() {
+    let limits = gpu::webgpu_limits();
+    for bits in 0..8 {
+        let sources = Sources {
+            neighbours: bits & 1 != 0,
+            coarse_field: bits & 2 != 0,
+            history: bits & 4 != 0,
+        };
+        for per_page in 1..=3 {
+            for network in [false, true] {
+                let plan = InfillPlan::new([40, 30], sources, network, &ranges(per_page), &limits);
+                let plan = plan.unwrap();
+                assert_eq!(plan.sources(), sources);
+                Infill::sources(&plan).iter().for_each(check);
+                Guide::source(&plan).iter().for_each(check);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_picture_costs_what_the_documentation_says() {
+    let limits = gpu::webgpu_limits();
+    let plan = |sources, network| {
+        InfillPlan::new([1280, 720], sources, network, &ranges(3), &limits).unwrap().bytes()
+    };
+    let no_history = Sources { history: false, ..Sources::default() };
+    let found = [
+        plan(Sources::default(), true),
+        plan(no_history, true),
+        plan(Sources::default(), false),
+        plan(no_history, false),
+    ];
+    println!("{found:?}");
+    // Depth and normals, which in-fill asks for, take 12 bytes a pixel more.
+    let pictures = 12 * 1280 * 720;
+    assert!(found[0] + pictures <= 40_000_000, "{}", found[0] + pictures);
+}
