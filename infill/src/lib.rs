@@ -4,9 +4,12 @@ pub mod cpu;
 mod error;
 mod kernels;
 #[cfg(test)]
+#[macro_use]
 mod layout_tests;
 pub mod options;
 mod plan;
+#[cfg(feature = "published-network")]
+pub mod published;
 mod stage;
 pub mod weights;
 
