@@ -135,9 +135,11 @@ def main():
     else:
         weights = load_file(paths[1])
         filled = by_onnx(paths[0], inputs)
-    filled = np.ascontiguousarray(np.stack(filled))
+    filled = np.stack(filled)
     print(f"filled {filled.min():.3f} to {filled.max():.3f}, {(status == UNFINISHED).mean():.0%} unfinished")
-    save_file({**weights, "color": color, "status": status, "filled": filled}, paths[-1])
+    # The file has the bytes as they lie in memory.
+    pictures = {"color": color, "status": status, "filled": filled}
+    save_file({**weights, **{name: np.ascontiguousarray(value) for name, value in pictures.items()}}, paths[-1])
 
 
 if __name__ == "__main__":
