@@ -1,5 +1,6 @@
 //! Metrics between two pictures of the same size.
 
+pub use crate::flip::flip;
 pub use crate::ssim::ssim;
 
 /// Peak signal-to-noise ratio in dB of values in `0..=peak`; infinite for equal pictures, and
@@ -11,6 +12,49 @@ pub use crate::ssim::ssim;
 pub fn psnr(actual: &[f32], expected: &[f32], peak: f64) -> f64 {
     let error = mean_square_error(actual, expected);
     if error == 0.0 { f64::INFINITY } else { 10.0 * (peak * peak / error).log10() }
+}
+
+/// [`psnr`] of the pixels that `chosen` names, colours of 0 to 1; `None` if there are none.
+///
+/// # Panics
+/// When the lengths differ.
+#[must_use]
+pub fn psnr_where(actual: &[[f32; 3]], expected: &[[f32; 3]], chosen: &[bool]) -> Option<f64> {
+    assert!(actual.len() == chosen.len(), "a choice of other pixels");
+    let pick = |picture: &[[f32; 3]]| -> Vec<f32> {
+        picture.iter().zip(chosen).filter(|(_, chosen)| **chosen).flat_map(|(c, _)| *c).collect()
+    };
+    assert_eq!(actual.len(), expected.len(), "pictures of different sizes");
+    let (actual, expected) = (pick(actual), pick(expected));
+    (!actual.is_empty()).then(|| psnr(&actual, &expected, 1.0))
+}
+
+/// [`psnr`] of the changes from one picture to the next, colours of 0 to 1: low where `actual` flickers. The pairs are
+/// (previous, this).
+///
+/// # Panics
+/// When the lengths differ or are 0.
+#[must_use]
+pub fn psnr_of_change(actual: [&[[f32; 3]]; 2], expected: [&[[f32; 3]]; 2]) -> f64 {
+    let change = |[before, after]: [&[[f32; 3]]; 2]| -> Vec<f32> {
+        assert_eq!(before.len(), after.len(), "pictures of different sizes");
+        before.iter().flatten().zip(after.iter().flatten()).map(|(b, a)| a - b).collect()
+    };
+    psnr(&change(actual), &change(expected), 1.0)
+}
+
+/// Pixels set in both masks over pixels set in any, among those that `chosen` names; `None` where none is set.
+///
+/// # Panics
+/// When the lengths differ.
+#[must_use]
+pub fn intersection_over_union(actual: &[bool], expected: &[bool], chosen: &[bool]) -> Option<f64> {
+    assert_eq!(actual.len(), expected.len(), "masks of different sizes");
+    assert_eq!(actual.len(), chosen.len(), "a choice of other pixels");
+    let count =
+        |set: &dyn Fn(usize) -> bool| (0..chosen.len()).filter(|&i| chosen[i] && set(i)).count();
+    let union = count(&|i| actual[i] || expected[i]);
+    (union > 0).then(|| count(&|i| actual[i] && expected[i]) as f64 / union as f64)
 }
 
 /// [`psnr`] of 8-bit channels, with a peak of 255.
@@ -113,6 +157,41 @@ mod tests {
             assert_eq!(difference.count(), 1);
             assert_eq!(difference.missing, usize::from(expected[pixel]));
         }
+    }
+
+    #[test]
+    fn chosen_pixels_alone_count() {
+        let expected = [[0.5f32; 3]; 10];
+        let mut actual = expected;
+        actual[3] = [0.6; 3];
+        actual[7] = [0.9; 3];
+        let chosen: Vec<bool> = (0..10).map(|i| i < 5).collect();
+        // Error 0.1^2 / 5 = 2e-3.
+        let found = psnr_where(&actual, &expected, &chosen).unwrap();
+        assert!((found - 10.0 * 500.0f64.log10()).abs() < 1e-4, "{found}");
+        let others: Vec<bool> = (0..10).map(|i| i != 3 && i != 7).collect();
+        assert_eq!(psnr_where(&actual, &expected, &others), Some(f64::INFINITY));
+        assert_eq!(psnr_where(&actual, &expected, &[false; 10]), None);
+    }
+
+    #[test]
+    fn a_flicker_is_seen_and_a_constant_error_is_not() {
+        let truth = [[[0.25f32; 3]; 4], [[0.5; 3]; 4]];
+        let pair = |p: &[[[f32; 3]; 4]; 2]| psnr_of_change([&p[0], &p[1]], [&truth[0], &truth[1]]);
+        assert_eq!(pair(&truth.map(|p| p.map(|c| c.map(|v| v + 0.25)))), f64::INFINITY);
+        let mut flicker = truth;
+        flicker[1][2] = [0.625; 3];
+        // (1/8)^2 / 4.
+        assert!((pair(&flicker) - 10.0 * 256.0f64.log10()).abs() < 1e-6);
+    }
+
+    #[test]
+    fn overlap_of_masks() {
+        let (a, b) = ([true, true, false, false], [true, false, true, false]);
+        assert_eq!(intersection_over_union(&a, &b, &[true; 4]), Some(1.0 / 3.0));
+        assert_eq!(intersection_over_union(&a, &a, &[true; 4]), Some(1.0));
+        assert_eq!(intersection_over_union(&a, &b, &[true, false, false, true]), Some(1.0));
+        assert_eq!(intersection_over_union(&a, &b, &[false, false, false, true]), None);
     }
 
     #[test]

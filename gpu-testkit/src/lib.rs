@@ -5,6 +5,7 @@
 
 pub mod bounds;
 pub mod compare;
+mod flip;
 pub mod gpu;
 pub mod image;
 pub mod judge;

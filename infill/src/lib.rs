@@ -5,9 +5,12 @@ mod error;
 mod guide;
 mod kernels;
 #[cfg(test)]
+#[macro_use]
 mod layout_tests;
 pub mod options;
 mod plan;
+#[cfg(feature = "published-network")]
+pub mod published;
 mod stage;
 pub mod weights;
 

@@ -5,6 +5,8 @@ pub mod field;
 pub mod fill;
 pub mod march;
 pub mod network;
+#[cfg(feature = "published-network")]
+pub mod published;
 pub mod push_pull;
 pub mod reproject;
 

@@ -1,0 +1,177 @@
+//! One sequence of frames, filled in every way.
+
+use std::path::Path;
+
+use progressive_iso::InfillWeights;
+
+use crate::contender::{Contender, Cut, Shown, WAYS, holes, nearest};
+#[cfg(feature = "published-network")]
+use crate::published::PublishedNetwork;
+use crate::rows::{Frame, Row};
+use crate::subject::{Motion, Subject};
+use crate::support::{Failure, Gpu};
+
+/// The renderers for one volume.
+pub struct Sequence {
+    /// In the order of [`WAYS`].
+    contenders: Vec<Contender>,
+    #[cfg(feature = "published-network")]
+    published: Option<PublishedNetwork>,
+    size: [u32; 2],
+}
+
+/// A picture by a method, with what it cost.
+struct Made {
+    method: &'static str,
+    shown: Shown,
+    ms: f64,
+    bytes: u64,
+}
+
+impl Sequence {
+    pub fn new(
+        gpu: &Gpu,
+        subject: &Subject,
+        size: [u32; 2],
+        weights: &'static InfillWeights,
+        published: Option<&Path>,
+    ) -> Result<Self, Failure> {
+        let contenders = WAYS
+            .iter()
+            .map(|way| Contender::new(gpu, &subject.volume, size, *way, weights))
+            .collect::<Result<Vec<_>, _>>()?;
+        if published.is_some() && !cfg!(feature = "published-network") {
+            return Err("--published needs the feature published-network".into());
+        }
+        let sequence = Self {
+            contenders,
+            #[cfg(feature = "published-network")]
+            published: None,
+            size,
+        };
+        sequence.with_published(gpu, published)
+    }
+
+    #[cfg(feature = "published-network")]
+    fn with_published(mut self, gpu: &Gpu, weights: Option<&Path>) -> Result<Self, Failure> {
+        if let Some(weights) = weights {
+            let renderer = &self.contenders[0].renderer;
+            self.published = Some(PublishedNetwork::new(gpu, renderer, self.size, weights)?);
+        }
+        Ok(self)
+    }
+
+    #[cfg(not(feature = "published-network"))]
+    fn with_published(self, _gpu: &Gpu, _weights: Option<&Path>) -> Result<Self, Failure> {
+        Ok(self)
+    }
+
+    /// Means over the frames of a sequence, one row per method; the last frame's pictures go to `out`.
+    pub fn measure(
+        &mut self,
+        gpu: &Gpu,
+        subject: &Subject,
+        motion: Motion,
+        cut: f64,
+        frames: u32,
+        out: &Path,
+    ) -> Result<Vec<Row>, Failure> {
+        let (mut measured, mut before): (Vec<Frame>, Option<Vec<Shown>>) = (Vec::new(), None);
+        let mut last_isovalue = None;
+        for frame in 0..frames {
+            let (camera, isovalue) = subject.view(motion, frame, frames, self.size);
+            let cuts = self
+                .contenders
+                .iter_mut()
+                .map(|contender| contender.cut(gpu, camera, isovalue, cut))
+                .collect::<Result<Vec<_>, _>>()?;
+            let holes = holes(&cuts[0].capture);
+            if cuts.iter().any(|c| crate::contender::holes(&c.capture) != holes) {
+                return Err("the renderers have finished different pixels".into());
+            }
+            let new_start = last_isovalue != Some(isovalue);
+            let made = self.pictures(gpu, &cuts, &holes, new_start)?;
+            let truth = Shown::from(&self.contenders[0].finish(gpu)?);
+            let old = before.take().filter(|_| !new_start);
+            let is_last = frame + 1 == frames;
+            let share = cuts[0].report.completeness_pixels();
+            for (i, made) in made.iter().enumerate() {
+                let previous = old.as_ref().map(|old| (&old[i], &old[old.len() - 1]));
+                let shown = (&made.shown, &truth, &holes[..]);
+                let cost = (made.ms, made.bytes);
+                measured.push(Frame::new(
+                    made.method,
+                    shown,
+                    previous,
+                    self.size,
+                    cost,
+                    is_last,
+                    share,
+                ));
+            }
+            if is_last {
+                let name = format!("{}-{}-{}-{cut}", subject.name, motion.name(), motion.degrees());
+                self.write(out, &name, &made, &truth)?;
+            }
+            last_isovalue = Some(isovalue);
+            before = Some(made.into_iter().map(|made| made.shown).chain([truth]).collect());
+        }
+        Ok(Row::means(&measured, subject.name, cut, motion))
+    }
+
+    /// What every method makes of a cut frame.
+    fn pictures(
+        &mut self,
+        gpu: &Gpu,
+        cuts: &[Cut],
+        holes: &[bool],
+        new_start: bool,
+    ) -> Result<Vec<Made>, Failure> {
+        let plain_bytes = cuts[0].report.bytes;
+        let mut made: Vec<Made> = WAYS
+            .iter()
+            .zip(cuts)
+            .map(|(way, cut)| Made {
+                method: way.name,
+                shown: Shown::from(&cut.capture),
+                ms: (cut.last_pass_ms - cuts[0].last_pass_ms).max(0.0),
+                bytes: cut.report.bytes.saturating_sub(plain_bytes),
+            })
+            .collect();
+        let shown = nearest(&made[0].shown, holes, self.size);
+        made.push(Made { method: "nearest", shown, ms: 0.0, bytes: 0 });
+        made.extend(self.published(gpu, new_start)?);
+        let network_ms = made.iter().find(|m| m.method == "network").map_or(0.0, |m| m.ms);
+        let capture = self.contenders[0].go_on(gpu, network_ms)?;
+        let shown = Shown::from(&capture);
+        made.push(Made { method: "more-passes", shown, ms: network_ms, bytes: 0 });
+        Ok(made)
+    }
+
+    #[cfg(feature = "published-network")]
+    fn published(&self, gpu: &Gpu, new_start: bool) -> Result<Option<Made>, Failure> {
+        let Some(network) = &self.published else { return Ok(None) };
+        if new_start {
+            network.clear(gpu)?;
+        }
+        let (shown, ms) = network.fill(gpu)?;
+        Ok(Some(Made { method: "published", shown, ms, bytes: network.bytes }))
+    }
+
+    #[cfg(not(feature = "published-network"))]
+    fn published(&self, _gpu: &Gpu, _new_start: bool) -> Result<Option<Made>, Failure> {
+        Ok(None)
+    }
+
+    fn write(&self, out: &Path, name: &str, made: &[Made], truth: &Shown) -> Result<(), Failure> {
+        let pictures = made.iter().map(|m| (m.method, &m.shown)).chain([("truth", truth)]);
+        for (method, shown) in pictures {
+            let byte = |v: f32| (255.0 * v + 0.5) as u8;
+            let bytes: Vec<u8> = shown.colors.iter().flatten().map(|v| byte(*v)).collect();
+            let path = out.join(format!("{name}-{method}.png"));
+            let [width, height] = self.size;
+            image::save_buffer(path, &bytes, width, height, image::ColorType::Rgb8)?;
+        }
+        Ok(())
+    }
+}

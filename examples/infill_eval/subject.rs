@@ -1,0 +1,80 @@
+//! The held-out volumes and how the camera moves.
+
+use progressive_iso::{Camera, CompressedVolume};
+
+use crate::support::Failure;
+
+/// Volumes that no training picture shows: the bundled scan, kinds that were never trained on, and other seeds of kinds
+/// that were.
+pub const NAMES: [&str; 6] = ["brain", "tubes", "gyroid", "turbulence", "blobs", "sheets"];
+
+/// Seed of the generated ones; `infill/training/splits.json` uses the seeds 1 to 3 to draw others.
+const SEED: u32 = 20_001;
+/// Their voxels on each axis and the rate of their streams in bits per voxel.
+const EDGE: u32 = 192;
+const RATE: f64 = 8.0;
+
+const FIELD_OF_VIEW_DEGREES: f64 = 50.0;
+const ELEVATION_DEGREES: f64 = 20.0;
+const FIRST_AZIMUTH_DEGREES: f64 = 30.0;
+/// Share of the isovalue from the middle of a sequence with a jump on.
+const JUMP: f32 = 0.95;
+
+/// What changes from frame to frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Motion {
+    /// Degrees per frame.
+    Orbit(f64),
+    Static,
+    /// An orbit of one degree per frame with another isovalue from the middle on.
+    IsovalueJump,
+}
+
+impl Motion {
+    pub fn degrees(self) -> f64 {
+        match self {
+            Self::Orbit(degrees) => degrees,
+            Self::Static => 0.0,
+            Self::IsovalueJump => 1.0,
+        }
+    }
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Orbit(_) => "orbit",
+            Self::Static => "static",
+            Self::IsovalueJump => "isovalue-jump",
+        }
+    }
+}
+
+/// A volume and its surface.
+pub struct Subject {
+    pub name: &'static str,
+    pub volume: CompressedVolume,
+    isovalue: f32,
+}
+
+impl Subject {
+    pub fn new(name: &'static str) -> Result<Self, Failure> {
+        if name == "brain" {
+            let volume = CompressedVolume::try_from(&volumes::brain())?;
+            return Ok(Self { name, volume, isovalue: volumes::BRAIN_ISOVALUE });
+        }
+        let dims = [EDGE; 3];
+        let field = volumes::by_name_with_seed(name, dims, SEED)?;
+        let volume = CompressedVolume::try_from(&volumes::generate(&*field, dims, RATE)?)?;
+        Ok(Self { name, volume, isovalue: field.suggested_isovalue() as f32 })
+    }
+
+    /// Camera and isovalue of a frame.
+    pub fn view(&self, motion: Motion, frame: u32, frames: u32, size: [u32; 2]) -> (Camera, f32) {
+        let (center, radius) = self.volume.bounding_ball();
+        let azimuth = FIRST_AZIMUTH_DEGREES + motion.degrees() * f64::from(frame);
+        let aspect = f64::from(size[0]) / f64::from(size[1]);
+        let fov = FIELD_OF_VIEW_DEGREES;
+        let camera = Camera::orbit(center, radius, azimuth, ELEVATION_DEGREES, fov, aspect);
+        let jumped = motion == Motion::IsovalueJump && 2 * frame >= frames;
+        (camera, self.isovalue * if jumped { JUMP } else { 1.0 })
+    }
+}
