@@ -90,8 +90,11 @@ impl Contender {
             size,
             budget_bytes: BUDGET_BYTES,
             outputs: Outputs { depth: true, normal: true, status: true },
-            infill: (way.infill != Infill::Off)
-                .then_some(InfillOptions { sources: way.sources, network }),
+            infill: (way.infill != Infill::Off).then_some(InfillOptions {
+                sources: way.sources,
+                network,
+                ..Default::default()
+            }),
             capture: true,
             strategy: TraversalStrategy::BlockSorted(BlockSortedOptions::default()),
             residency: Residency::Cached,
