@@ -13,9 +13,15 @@ use crate::support::{Failure, Gpu};
 
 const BUDGET_BYTES: u64 = 512 << 20;
 
-/// A background that alpha tells from the surface, and what the published network takes for unfinished.
+/// The published renderer's colours, for which its network was trained, over a background that alpha tells from the
+/// surface.
 pub fn shading() -> Shading {
     Shading {
+        base_color: [0.3, 0.3, 0.9],
+        ambient: 0.2,
+        diffuse: 0.6,
+        specular: 0.1,
+        shininess: 5.0,
         background: [1.0, 1.0, 1.0, 0.0],
         unfinished: [1.0, 0.0, 0.0, 0.0],
         ..Shading::default()

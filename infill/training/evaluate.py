@@ -3,7 +3,7 @@
     python evaluate.py HELD_OUT_FOLDER --out evaluation.json [--published WEIGHTS.safetensors] [--flip]
     python evaluate.py HELD_OUT_FOLDER --check evaluation.json
 
---published takes the published weights (convert_published.py) and adds their rows; --flip needs flip-evaluator. With
+Pictures have the colours of the published renderer, for which its network was trained. --published takes the published weights (convert_published.py) and adds their rows; --flip needs flip-evaluator. With
 --check nothing is written: figures that differ from those of the file by more than 0.02 (dB; or 0.0005 of another
 measure) are named, and the exit code is 1.
 """
@@ -48,7 +48,7 @@ class Mixture:
         else:
             outputs = torch.zeros(1, OUTPUTS, *frame["c"].shape[1:])
         coverage, facing = shown(frame, *mix(frame, outputs))
-        return shading.picture(coverage, facing), coverage
+        return shading.picture(coverage, facing, shading.PUBLISHED), coverage
 
 
 class Unfinished:
@@ -58,7 +58,7 @@ class Unfinished:
         pass
 
     def __call__(self, frame):
-        picture = shading.picture(frame["c"], frame["nv"])
+        picture = shading.picture(frame["c"], frame["nv"], shading.PUBLISHED)
         red = torch.tensor(shading.UNFINISHED).view(1, 3, 1, 1)
         return torch.where(frame["finished"].unsqueeze(1) > 0, picture, red), frame["c"]
 
@@ -142,7 +142,7 @@ def evaluate(folder, published, with_flip):
             previous, before = sequence, {}
             for method in of.values():
                 method.start(frame)
-        truth = shading.picture(frame["truth_c"], frame["truth_nv"])
+        truth = shading.picture(frame["truth_c"], frame["truth_nv"], shading.PUBLISHED)
         for name, method in of.items():
             row, before[name] = measured(frame, method(frame), truth, before.get(name), with_flip)
             rows[name, record["volume"], cut_group(record)].append(row)
