@@ -7,7 +7,7 @@ use crate::weights::{LAYERS, Weights};
 /// Channels that the network reads at every pixel; [`super::features`] says what they are.
 pub const FEATURES: usize = 16;
 
-/// Numbers that the network gives for every pixel: logits of the candidates in the order of [`super::SOURCES`],
+/// Numbers that the network gives for every pixel: logits of the candidates in the order of [`crate::Source`],
 /// then residuals of coverage and N.V.
 pub const OUTPUTS: usize = 6;
 
