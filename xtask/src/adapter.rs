@@ -2,9 +2,9 @@
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 
-use crate::process;
+use crate::{packages, process};
 
 /// Vulkan driver with the software adapter lavapipe, and the loader that finds it.
 const PACKAGES: [&str; 2] = ["mesa-vulkan-drivers", "libvulkan1"];
@@ -51,35 +51,9 @@ pub(crate) fn ensure() -> Result<String, String> {
     if let Some(description) = find(&[])? {
         return Ok(description);
     }
-    if let Some(prefix) = administrator() {
-        println!("no GPU adapter found: installing {} with apt-get", PACKAGES.join(" and "));
-        apt_get(prefix, &["update"])?;
-        let install = [&["install", "--yes", "--no-install-recommends"], &PACKAGES[..]].concat();
-        apt_get(prefix, &install)?;
-    }
+    println!("no GPU adapter found");
+    packages::install(&PACKAGES)?;
     describe(&[])
-}
-
-/// What to put before a command so that it runs as root, where apt-get is there and that is
-/// possible without a password.
-fn administrator() -> Option<&'static [&'static str]> {
-    if !process::succeeds("apt-get", &["--version"]) {
-        return None;
-    }
-    let id = process::output(Command::new("id").arg("-u")).unwrap_or_default();
-    if id.trim_ascii() == b"0" {
-        Some(&["env"])
-    } else if process::succeeds("sudo", &["-n", "true"]) {
-        Some(&["sudo", "-n", "env"])
-    } else {
-        None
-    }
-}
-
-fn apt_get(prefix: &[&str], arguments: &[&str]) -> Result<(), String> {
-    let mut command = Command::new(prefix[0]);
-    command.args(&prefix[1..]).args(["DEBIAN_FRONTEND=noninteractive", "apt-get", "-qq"]);
-    process::run(command.args(arguments))
 }
 
 /// SwiftShader's driver description, if one is found.

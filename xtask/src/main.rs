@@ -3,8 +3,13 @@
 
 mod adapter;
 mod msrv;
+mod packages;
 mod process;
 mod published;
+#[cfg(feature = "web")]
+mod serve;
+#[cfg(feature = "web")]
+mod web;
 
 use std::process::ExitCode;
 
@@ -16,7 +21,12 @@ usage: cargo xtask COMMAND
   demo [ARGUMENTS]  make sure that there is a GPU adapter, then render the example to out/demo
                     (further arguments go to the example)
   test [ARGUMENTS]  make sure that there is a GPU adapter, then run every test, on SwiftShader too
-                    where it is found (further arguments go to both runs of cargo test)
+                    where it is found (further arguments go to both runs of cargo test), and those of
+                    the web page
+  web [--serve [PORT]]
+                    build the web page in web/dist, and serve it on this computer
+  web --test | --measure
+                    test the page in Chromium, or measure it for docs/performance.md
   msrv              check that no dependency of a published crate needs a newer Rust
   features          check that every published crate compiles with each of its features alone
   outside           build and run a program outside the workspace that uses the published crate
@@ -33,6 +43,7 @@ fn main() -> ExitCode {
     let result = match (command.as_str(), rest.as_slice()) {
         ("demo", _) => demo(&rest),
         ("test", _) => test(&rest),
+        ("web", _) => web(&rest),
         ("msrv", []) => msrv::check(),
         ("features", []) => published::check_features(),
         ("outside", []) => published::run_outside(),
@@ -62,13 +73,31 @@ fn demo(arguments: &[String]) -> Result<(), String> {
     process::run(cargo.args(arguments))
 }
 
+/// The command `web`, in a build of this program that has it.
+#[cfg(not(feature = "web"))]
+fn web(arguments: &[String]) -> Result<(), String> {
+    let mut cargo = process::cargo();
+    cargo.args(["run", "--quiet", "--package", "xtask", "--features", "web", "--", "web"]);
+    process::run(cargo.args(arguments))
+}
+
+#[cfg(feature = "web")]
+fn web(arguments: &[String]) -> Result<(), String> {
+    web::run(arguments)
+}
+
 fn test(arguments: &[String]) -> Result<(), String> {
     let first = adapter::ensure()?;
     println!("adapter: {first}");
     process::run(process::cargo().args(["test", "--workspace"]).args(arguments))?;
-    if adapter::is_swiftshader(&first) {
-        return Ok(());
+    if !adapter::is_swiftshader(&first) {
+        test_second_driver(arguments)?;
     }
+    // A selection of tests has none of the page.
+    if arguments.is_empty() { web(&["--test".to_owned()]) } else { Ok(()) }
+}
+
+fn test_second_driver(arguments: &[String]) -> Result<(), String> {
     let Some(icd) = adapter::swiftshader_icd() else {
         println!("{}", adapter::NO_SECOND_DRIVER);
         return Ok(());

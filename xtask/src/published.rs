@@ -1,7 +1,5 @@
 //! Checks of the published crates as others will use them: features, archives, a foreign workspace.
 
-use std::path::Path;
-
 use serde_json::Value;
 
 use crate::{adapter, process};
@@ -77,7 +75,7 @@ pub(crate) fn package(arguments: &[String]) -> Result<(), String> {
 /// Builds and runs a program outside the workspace, with the versions of the workspace's lock file.
 pub(crate) fn run_outside() -> Result<(), String> {
     adapter::ensure()?;
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."));
+    let root = process::root();
     let outside = root.join("tests/outside-crate");
     std::fs::copy(root.join("Cargo.lock"), outside.join("Cargo.lock"))
         .map_err(|error| format!("the lock file cannot be copied: {error}"))?;
