@@ -37,7 +37,7 @@ pub enum Residency {
 pub struct InfillOptions {
     /// Where guesses come from.
     pub sources: Sources,
-    /// Weights of the network, for [`Infill::Network`].
+    /// Weights of the network, for [`Infill::Network`]; [`Weights::trained`] are those that come with the crate.
     pub network: Option<&'static Weights>,
     /// What [`FrameOptions::guided`] needs; nothing where the whole volume is resident.
     pub guided: bool,

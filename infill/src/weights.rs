@@ -1,5 +1,7 @@
 //! The network's weights.
 
+use std::sync::LazyLock;
+
 use half::f16;
 use safetensors::{Dtype, SafeTensors};
 
@@ -67,6 +69,16 @@ impl Weights {
         }
         count
     };
+
+    /// The trained weights that come with the crate; `infill/training` says how they were made.
+    pub fn trained() -> &'static Self {
+        static TRAINED: LazyLock<Weights> = LazyLock::new(|| {
+            // A test reads them, so that the zeros, with which pixels are filled all the same, are never needed.
+            Weights::from_safetensors(include_bytes!("../weights/infill.safetensors"))
+                .unwrap_or_else(|_| Weights::zero())
+        });
+        &TRAINED
+    }
 
     /// All zero: the filler without a network.
     pub fn zero() -> Self {
@@ -267,5 +279,15 @@ mod tests {
             }
         });
         assert!(matches!(Weights::from_safetensors(&range), Err(Error::WeightsRange { .. })));
+    }
+
+    #[test]
+    fn the_trained_weights_are_those_of_the_file() {
+        let bytes = include_bytes!("../weights/infill.safetensors");
+        assert_eq!(Weights::trained(), &Weights::from_safetensors(bytes).unwrap());
+        for (i, layer) in LAYERS.iter().enumerate() {
+            let weights = &Weights::trained().layer(i).weight;
+            assert!(weights.iter().any(|w| *w != f16::ZERO), "{}", layer.name);
+        }
     }
 }

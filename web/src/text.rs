@@ -130,7 +130,7 @@ mod tests {
     fn purposes_add_up() {
         let all: Vec<_> = Category::ALL.into_iter().zip(1u64..).collect();
         let sums = by_purpose(&all);
-        assert_eq!(sums.iter().map(|s| s.1).sum::<u64>(), all.iter().map(|c| c.1).sum());
+        assert_eq!(sums.iter().map(|s| s.1).sum::<u64>(), all.iter().map(|c| c.1).sum::<u64>());
         assert!(sums.windows(2).all(|pair| pair[0].1 >= pair[1].1));
         assert!(by_purpose(&[(Category::Rays, 0)]).is_empty());
     }
