@@ -24,6 +24,8 @@ TRIES = 4
 LEAST_HOLES = 0.01
 # Chances that a picture lacks a source, so that each can be left out.
 DROP = {"P": 0.05, "LX": 0.1, "R": 0.25}
+# A wrong N.V shows more in the first, a surface where there is none in the second.
+COLORS = [shading.DEFAULT, shading.PUBLISHED]
 LEARNING_RATE = 3e-3
 SSIM_WEIGHT = 0.5
 # Pulls what the residuals push beyond 0..1 back, where clamping has no gradient.
@@ -66,12 +68,12 @@ def drop_sources(frame, rng):
     return frame
 
 
-def loss_of(network, frame):
+def loss_of(network, frame, colors):
     outputs = network(features(frame).to(memory_format=torch.channels_last))
     raw = mix(frame, outputs)
     coverage, facing = shown(frame, *raw)
-    picture = shading.picture(coverage, facing)
-    truth = shading.picture(frame["truth_c"], frame["truth_nv"])
+    picture = shading.picture(coverage, facing, colors)
+    truth = shading.picture(frame["truth_c"], frame["truth_nv"], colors)
     holes = (frame["finished"] == 0).unsqueeze(1).float()
     count = holes.sum().clamp(min=1)
     error = (picture - truth) * holes
@@ -86,7 +88,7 @@ def loss_of(network, frame):
 def validate(network, batches):
     """Mean loss and holes-only PSNR over fixed crops."""
     with torch.no_grad():
-        results = [loss_of(network, data.as_frame(batch)) for batch in batches]
+        results = [loss_of(network, data.as_frame(batch), colors) for batch in batches for colors in COLORS]
     loss, mean_square = (torch.stack(column).mean().item() for column in zip(*results))
     return loss, metrics.psnr_of(mean_square)
 
@@ -130,7 +132,8 @@ def main():
         if step == arguments.steps:
             break
         batch = np.stack([random_crop(frames, rng) for _ in range(arguments.batch)])
-        loss, _ = loss_of(network, drop_sources(data.as_frame(batch), rng))
+        colors = COLORS[rng.integers(len(COLORS))]
+        loss, _ = loss_of(network, drop_sources(data.as_frame(batch), rng), colors)
         optimiser.zero_grad()
         loss.backward()
         optimiser.step()
