@@ -63,6 +63,9 @@ fn main() -> ExitCode {
     }
 }
 
+/// What the tests cover beside the default features.
+const FEATURES: &str = "progressive-iso/published-network";
+
 fn demo(arguments: &[String]) -> Result<(), String> {
     println!("adapter: {}", adapter::ensure()?);
     let mut cargo = process::cargo();
@@ -89,7 +92,9 @@ fn web(arguments: &[String]) -> Result<(), String> {
 fn test(arguments: &[String]) -> Result<(), String> {
     let first = adapter::ensure()?;
     println!("adapter: {first}");
-    process::run(process::cargo().args(["test", "--workspace"]).args(arguments))?;
+    let mut cargo = process::cargo();
+    cargo.args(["test", "--workspace", "--features", FEATURES]).args(arguments);
+    process::run(&mut cargo)?;
     if !adapter::is_swiftshader(&first) {
         test_second_driver(arguments)?;
     }
@@ -105,6 +110,6 @@ fn test_second_driver(arguments: &[String]) -> Result<(), String> {
     println!("second adapter: {}", adapter::describe(&adapter::only(&icd))?);
     // Documentation tests bring nothing new on another driver.
     let mut cargo = process::cargo();
-    cargo.args(["test", "--workspace", "--tests"]).args(arguments);
+    cargo.args(["test", "--workspace", "--features", FEATURES, "--tests"]).args(arguments);
     process::run(cargo.envs(adapter::only(&icd)))
 }
