@@ -103,7 +103,7 @@ def main():
     parser.add_argument("validation")
     parser.add_argument("--out", required=True)
     parser.add_argument("--curve", required=True)
-    parser.add_argument("--steps", type=int, default=15_000)
+    parser.add_argument("--steps", type=int, default=12_000)
     parser.add_argument("--batch", type=int, default=6)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--threads", type=int, default=1)
