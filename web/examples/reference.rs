@@ -91,11 +91,15 @@ fn render(
         if let Some(view) = link.view {
             session.set_view(view);
         }
-        while !session.advance(&gpu.device, &gpu.queue)?.rests {
-            gpu.device.poll(wgpu::PollType::wait_indefinitely())?;
-            if first_ms.is_none() && !session.passes().is_empty() {
-                first_ms = Some(1e3 * began.elapsed().as_secs_f64());
+        loop {
+            let step = session.advance(&gpu.device, &gpu.queue)?;
+            if step.is_new {
+                first_ms.get_or_insert_with(|| 1e3 * began.elapsed().as_secs_f64());
             }
+            if step.rests {
+                break;
+            }
+            gpu.device.poll(wgpu::PollType::wait_indefinitely())?;
         }
         let passes: Vec<_> = session.passes().iter().map(|p| [p.ms, p.completeness]).collect();
         rows.push(json!({ "name": text("name"), "passes": passes }));
