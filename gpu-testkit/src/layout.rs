@@ -1,37 +1,8 @@
 //! Reflection of WGSL, so that tests compare host-side layouts with what the shader declares.
 
+use gpu_primitives::kernel::{Binding, KernelSource};
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use naga::{AddressSpace, GlobalVariable, Handle, ImageClass, Module, ScalarKind, TypeInner};
-
-/// What the host binds at one `@binding` of group 0, in the order of the binding index.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum BindingKind {
-    /// A uniform buffer of exactly this many bytes.
-    Uniform {
-        /// Size of the WGSL type.
-        bytes: u64,
-    },
-    /// A storage buffer that the shader only reads.
-    StorageRead {
-        /// Least size that the host promises; 0 promises nothing and checks nothing.
-        min_bytes: u64,
-    },
-    /// A storage buffer that the shader reads and writes.
-    StorageReadWrite {
-        /// Least size that the host promises; 0 promises nothing and checks nothing.
-        min_bytes: u64,
-    },
-    /// A storage texture that the shader writes.
-    TextureWrite {
-        /// Texel format, the same as in the WGSL type.
-        format: wgpu::TextureFormat,
-    },
-    /// A texture that the shader samples or loads.
-    TextureSample {
-        /// Kind of value that a load gives.
-        sample: wgpu::TextureSampleType,
-    },
-}
 
 /// WebGPU's default limits for what one shader stage uses, with the name of each.
 const DEFAULT_LIMITS: [(&str, usize); 4] = [
@@ -122,16 +93,23 @@ pub fn struct_size(source: &str, struct_name: &str) -> Result<u32, String> {
     find_struct(&module, struct_name).map(|(_, span)| span)
 }
 
+/// Checks a kernel: its text as [`validate_wgsl`] does, and that it declares what the kernel binds.
+///
+/// # Errors
+/// The kernel's label and the first problem.
+pub fn check_kernel(source: &KernelSource) -> Result<(), String> {
+    let text = &source.wgsl.source;
+    validate_wgsl(text)
+        .and_then(|()| check_bindings(text, source.entry_point, &source.bindings))
+        .map_err(|problem| format!("{}: {problem}", source.label))
+}
+
 /// Checks that every variable the entry point uses is in group 0 and of the kind that `expected`
 /// gives for its binding index, and that every expected binding is declared in the source.
 ///
 /// # Errors
 /// The first difference, or that the source does not compile or lacks the entry point.
-pub fn check_bindings(
-    source: &str,
-    entry_point: &str,
-    expected: &[BindingKind],
-) -> Result<(), String> {
+pub fn check_bindings(source: &str, entry_point: &str, expected: &[Binding]) -> Result<(), String> {
     let (module, info) = parse(source)?;
     let Some(index) = module.entry_points.iter().position(|entry| entry.name == entry_point) else {
         let names: Vec<_> = module.entry_points.iter().map(|entry| &entry.name).collect();
@@ -212,28 +190,24 @@ fn limit_class(module: &Module, variable: &GlobalVariable) -> Option<usize> {
     }
 }
 
-fn check_kind(
-    module: &Module,
-    variable: &GlobalVariable,
-    expected: BindingKind,
-) -> Result<(), String> {
+fn check_kind(module: &Module, variable: &GlobalVariable, expected: Binding) -> Result<(), String> {
     let bytes = u64::from(size_of(module, variable));
     let writes = |access: naga::StorageAccess| access.contains(naga::StorageAccess::STORE);
     let inner = &module.types[variable.ty].inner;
     let ok = match (expected, variable.space, inner) {
-        (BindingKind::Uniform { bytes: expected }, AddressSpace::Uniform, _) => expected == bytes,
-        (BindingKind::StorageRead { min_bytes }, AddressSpace::Storage { access }, _) => {
+        (Binding::Uniform { bytes: expected }, AddressSpace::Uniform, _) => expected == bytes,
+        (Binding::StorageRead { min_bytes }, AddressSpace::Storage { access }, _) => {
             !writes(access) && (min_bytes == 0 || min_bytes >= bytes)
         }
-        (BindingKind::StorageReadWrite { min_bytes }, AddressSpace::Storage { access }, _) => {
+        (Binding::StorageReadWrite { min_bytes }, AddressSpace::Storage { access }, _) => {
             writes(access) && (min_bytes == 0 || min_bytes >= bytes)
         }
-        (BindingKind::TextureWrite { format }, _, TypeInner::Image { class, .. }) => {
+        (Binding::TextureWrite { format }, _, TypeInner::Image { class, .. }) => {
             // naga and wgpu give their formats the same names.
             matches!(class, ImageClass::Storage { format: found, access } if writes(*access)
                 && format!("{found:?}") == format!("{format:?}"))
         }
-        (BindingKind::TextureSample { sample }, _, TypeInner::Image { class, .. }) => {
+        (Binding::TextureSample { sample }, _, TypeInner::Image { class, .. }) => {
             sample_matches(*class, sample)
         }
         _ => false,
@@ -264,6 +238,8 @@ fn sample_matches(class: ImageClass, sample: wgpu::TextureSampleType) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use gpu_primitives::wgsl::{Module, compose_fixed};
+
     use super::*;
 
     const SHADER: &str = "
@@ -284,15 +260,13 @@ mod tests {
 
     const MEMBERS: [(&str, u32, u32); 3] = [("origin", 0, 12), ("count", 12, 4), ("size", 16, 8)];
 
-    fn bindings() -> Vec<BindingKind> {
+    fn bindings() -> Vec<Binding> {
         vec![
-            BindingKind::Uniform { bytes: 32 },
-            BindingKind::StorageRead { min_bytes: 8 },
-            BindingKind::StorageReadWrite { min_bytes: 0 },
-            BindingKind::TextureWrite { format: wgpu::TextureFormat::Rgba8Unorm },
-            BindingKind::TextureSample {
-                sample: wgpu::TextureSampleType::Float { filterable: false },
-            },
+            Binding::Uniform { bytes: 32 },
+            Binding::StorageRead { min_bytes: 8 },
+            Binding::StorageReadWrite { min_bytes: 0 },
+            Binding::TextureWrite { format: wgpu::TextureFormat::Rgba8Unorm },
+            Binding::TextureSample { sample: wgpu::TextureSampleType::Float { filterable: false } },
         ]
     }
 
@@ -321,11 +295,11 @@ mod tests {
     fn matching_bindings_pass_and_each_corruption_fails() {
         check_bindings(SHADER, "main", &bindings()).unwrap();
         let wrong = [
-            BindingKind::Uniform { bytes: 28 },
-            BindingKind::StorageReadWrite { min_bytes: 8 },
-            BindingKind::StorageRead { min_bytes: 4 },
-            BindingKind::TextureWrite { format: wgpu::TextureFormat::R32Float },
-            BindingKind::TextureSample { sample: wgpu::TextureSampleType::Uint },
+            Binding::Uniform { bytes: 28 },
+            Binding::StorageReadWrite { min_bytes: 8 },
+            Binding::StorageRead { min_bytes: 4 },
+            Binding::TextureWrite { format: wgpu::TextureFormat::R32Float },
+            Binding::TextureSample { sample: wgpu::TextureSampleType::Uint },
         ];
         for (index, wrong) in wrong.into_iter().enumerate() {
             let mut list = bindings();
@@ -334,14 +308,27 @@ mod tests {
             assert!(problem.starts_with(&format!("binding {index} ")), "{problem}");
         }
         let mut small = bindings();
-        small[1] = BindingKind::StorageRead { min_bytes: 4 };
+        small[1] = Binding::StorageRead { min_bytes: 4 };
         assert!(check_bindings(SHADER, "main", &small).is_err(), "one element takes 8 bytes");
         assert!(check_bindings(SHADER, "main", &bindings()[..4]).unwrap_err().contains("depth"));
-        let longer = [bindings(), vec![BindingKind::StorageRead { min_bytes: 4 }]].concat();
+        let longer = [bindings(), vec![Binding::StorageRead { min_bytes: 4 }]].concat();
         assert!(check_bindings(SHADER, "main", &longer).unwrap_err().contains("not declared"));
         assert!(check_bindings(SHADER, "other", &bindings()).unwrap_err().contains("main"));
         let grouped = SHADER.replace("@group(0) @binding(2)", "@group(1) @binding(2)");
         assert!(check_bindings(&grouped, "main", &bindings()).unwrap_err().contains("group 1"));
+    }
+
+    #[test]
+    fn a_kernel_that_binds_something_else_or_is_no_shader_is_named() {
+        let kernel = |text, bindings| {
+            let wgsl = compose_fixed(Module { name: "test", source: text }, &[], &[]);
+            KernelSource { label: "test.kernel", wgsl, entry_point: "main", bindings }
+        };
+        check_kernel(&kernel(SHADER, bindings())).unwrap();
+        for wrong in [kernel(SHADER, bindings()[..4].to_vec()), kernel("fn f( {", bindings())] {
+            let problem = check_kernel(&wrong).unwrap_err();
+            assert!(problem.starts_with("test.kernel: "), "{problem}");
+        }
     }
 
     #[test]

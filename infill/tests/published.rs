@@ -5,11 +5,11 @@
 
 use std::path::Path;
 
-use gpu_primitives::kernel::{Binding, KernelSource};
+use gpu_primitives::kernel::KernelSource;
 use gpu_primitives::memory::Ledger;
 use gpu_testkit::compare::within_abs;
 use gpu_testkit::gpu::{device, read_f32s, submit_and_wait};
-use gpu_testkit::layout::{BindingKind, check_bindings, validate_wgsl};
+use gpu_testkit::layout::check_kernel;
 use infill::cpu::published::{Planes, Published as Twin};
 use infill::published::{
     Published, PublishedBuffers, PublishedOptions, PublishedPicture, PublishedPlan,
@@ -251,23 +251,10 @@ fn sources() -> Vec<KernelSource> {
     [false, true].into_iter().flat_map(|paste| Published::sources(options(paste))).collect()
 }
 
-fn kind(binding: &Binding) -> BindingKind {
-    match *binding {
-        Binding::Uniform { bytes } => BindingKind::Uniform { bytes },
-        Binding::StorageRead { min_bytes } => BindingKind::StorageRead { min_bytes },
-        Binding::StorageReadWrite { min_bytes } => BindingKind::StorageReadWrite { min_bytes },
-        Binding::TextureSample { sample } => BindingKind::TextureSample { sample },
-        ref other => panic!("unexpected {other:?}"),
-    }
-}
-
 #[test]
 fn shaders_are_valid_and_declare_what_is_bound() {
     for source in sources() {
-        validate_wgsl(&source.wgsl.source).unwrap_or_else(|e| panic!("{}: {e}", source.label));
-        let kinds: Vec<_> = source.bindings.iter().map(kind).collect();
-        check_bindings(&source.wgsl.source, source.entry_point, &kinds)
-            .unwrap_or_else(|e| panic!("{}: {e}", source.label));
+        check_kernel(&source).unwrap();
     }
 }
 

@@ -2,28 +2,14 @@
 
 #![allow(clippy::unwrap_used, reason = "a failed set-up fails the test")]
 
-use gpu_primitives::kernel::{Binding, KernelSource};
+use gpu_primitives::kernel::KernelSource;
 use gpu_testkit::gpu;
-use gpu_testkit::layout::{self, BindingKind};
+use gpu_testkit::layout::check_kernel;
 use infill::{Guide, Infill, InfillPlan, Sources};
 use macrocell::MacrocellPlan;
 
-fn kind(binding: &Binding) -> BindingKind {
-    match *binding {
-        Binding::Uniform { bytes } => BindingKind::Uniform { bytes },
-        Binding::StorageRead { min_bytes } => BindingKind::StorageRead { min_bytes },
-        Binding::StorageReadWrite { min_bytes } => BindingKind::StorageReadWrite { min_bytes },
-        Binding::TextureWrite { format } => BindingKind::TextureWrite { format },
-        Binding::TextureSample { sample } => BindingKind::TextureSample { sample },
-    }
-}
-
 fn check(source: &KernelSource) {
-    let text = &source.wgsl.source;
-    layout::validate_wgsl(text).unwrap_or_else(|e| panic!("{}: {e}", source.label));
-    let kinds: Vec<BindingKind> = source.bindings.iter().map(kind).collect();
-    layout::check_bindings(text, source.entry_point, &kinds)
-        .unwrap_or_else(|e| panic!("{}: {e}", source.label));
+    check_kernel(source).unwrap();
 }
 
 /// Ranges of a volume of 3x1x1 coarse cells in pages of so many.

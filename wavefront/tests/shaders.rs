@@ -1,25 +1,13 @@
 //! Every shader composes, validates and binds what the Rust side says.
 
-use gpu_primitives::kernel::{Binding, KernelSource};
-use gpu_testkit::layout::{self, BindingKind};
+#![allow(clippy::unwrap_used, reason = "a failed set-up fails the test")]
+
+use gpu_primitives::kernel::KernelSource;
+use gpu_testkit::layout::{check_kernel, validate_wgsl};
 use wavefront::{Outputs, Rays, RunAhead, SampleLayout};
 
-fn kind(binding: &Binding) -> BindingKind {
-    match *binding {
-        Binding::Uniform { bytes } => BindingKind::Uniform { bytes },
-        Binding::StorageRead { min_bytes } => BindingKind::StorageRead { min_bytes },
-        Binding::StorageReadWrite { min_bytes } => BindingKind::StorageReadWrite { min_bytes },
-        Binding::TextureWrite { format } => BindingKind::TextureWrite { format },
-        Binding::TextureSample { sample } => BindingKind::TextureSample { sample },
-    }
-}
-
 fn check(source: &KernelSource) {
-    let text = &source.wgsl.source;
-    layout::validate_wgsl(text).unwrap_or_else(|e| panic!("{}: {e}", source.label));
-    let kinds: Vec<BindingKind> = source.bindings.iter().map(kind).collect();
-    layout::check_bindings(text, source.entry_point, &kinds)
-        .unwrap_or_else(|e| panic!("{}: {e}", source.label));
+    check_kernel(source).unwrap();
 }
 
 #[test]
@@ -46,5 +34,5 @@ fn block_sorted_kernels_validate() {
 
 #[test]
 fn draw_validates() {
-    layout::validate_wgsl(include_str!("../shader/draw.wgsl")).unwrap();
+    validate_wgsl(include_str!("../shader/draw.wgsl")).unwrap();
 }

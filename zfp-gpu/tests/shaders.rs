@@ -3,8 +3,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a failed set-up fails the test")]
 
-use gpu_primitives::kernel::{Binding, KernelSource};
-use gpu_testkit::layout::{BindingKind, check_bindings, check_struct, validate_wgsl};
+use gpu_primitives::kernel::KernelSource;
+use gpu_testkit::layout::{check_bindings, check_kernel, check_struct};
 use zfp_gpu::{BlockExtrema, Decode};
 
 fn sources() -> Vec<KernelSource> {
@@ -13,28 +13,11 @@ fn sources() -> Vec<KernelSource> {
     decodes.chain(extrema).collect()
 }
 
-fn kind(binding: &Binding) -> BindingKind {
-    match *binding {
-        Binding::Uniform { bytes } => BindingKind::Uniform { bytes },
-        Binding::StorageRead { min_bytes } => BindingKind::StorageRead { min_bytes },
-        Binding::StorageReadWrite { min_bytes } => BindingKind::StorageReadWrite { min_bytes },
-        ref other => panic!("unexpected {other:?}"),
-    }
-}
-
 #[test]
-fn shaders_are_valid_under_default_limits() {
+fn shaders_are_valid_and_declare_what_is_bound() {
     for source in sources() {
-        validate_wgsl(&source.wgsl.source).unwrap();
-    }
-}
-
-#[test]
-fn shaders_declare_what_is_bound() {
-    for source in sources() {
-        let kinds: Vec<_> = source.bindings.iter().map(kind).collect();
-        check_bindings(&source.wgsl.source, source.entry_point, &kinds).unwrap();
-        let short = &kinds[..kinds.len() - 1];
+        check_kernel(&source).unwrap();
+        let short = &source.bindings[..source.bindings.len() - 1];
         check_bindings(&source.wgsl.source, source.entry_point, short).unwrap_err();
     }
 }

@@ -2,7 +2,7 @@
 
 use gpu_primitives::kernel::{Binding, KernelSource};
 use gpu_primitives::wgsl::{Module, compose};
-use gpu_testkit::layout::{BindingKind, check_bindings, validate_wgsl};
+use gpu_testkit::layout::{check_bindings, check_kernel, validate_wgsl};
 use lru_cache_gpu::{Service, wgsl};
 
 use crate::harness::script_source;
@@ -15,28 +15,10 @@ fn sources() -> Vec<KernelSource> {
     sources
 }
 
-fn kind(binding: &Binding) -> BindingKind {
-    match *binding {
-        Binding::Uniform { bytes } => BindingKind::Uniform { bytes },
-        Binding::StorageRead { min_bytes } => BindingKind::StorageRead { min_bytes },
-        Binding::StorageReadWrite { min_bytes } => BindingKind::StorageReadWrite { min_bytes },
-        ref other => panic!("unexpected {other:?}"),
-    }
-}
-
 #[test]
-fn shaders_are_valid_under_default_limits() {
+fn shaders_are_valid_and_declare_what_is_bound() {
     for source in sources() {
-        validate_wgsl(&source.wgsl.source).unwrap_or_else(|e| panic!("{}: {e}", source.label));
-    }
-}
-
-#[test]
-fn shaders_declare_what_is_bound() {
-    for source in sources() {
-        let kinds: Vec<_> = source.bindings.iter().map(kind).collect();
-        check_bindings(&source.wgsl.source, source.entry_point, &kinds)
-            .unwrap_or_else(|e| panic!("{}: {e}", source.label));
+        check_kernel(&source).unwrap();
     }
 }
 
@@ -54,9 +36,9 @@ fn lookup_alone_needs_only_a_read_only_directory() {
     let text = compose(entry, &wgsl::MODULES, &[]).unwrap().source;
     validate_wgsl(&text).unwrap();
     let kinds = [
-        BindingKind::Uniform { bytes: 16 },
-        BindingKind::StorageRead { min_bytes: 4 },
-        BindingKind::StorageReadWrite { min_bytes: 4 },
+        Binding::Uniform { bytes: 16 },
+        Binding::StorageRead { min_bytes: 4 },
+        Binding::StorageReadWrite { min_bytes: 4 },
     ];
     check_bindings(&text, "main", &kinds).unwrap();
 }
