@@ -3,8 +3,8 @@
 #import infill_params
 #import infill_rays
 #import macrocell_skip
-#import lru_request
 #import block_need
+#import block_request
 #import march
 #import indirect
 
@@ -34,18 +34,6 @@ fn macrocell_mask(index: u32) -> vec2<u32> {
     return masks[index];
 }
 
-// Requests the needed ones of a block and its plus-side neighbours.
-fn request(block: vec3<i32>, need: u32) {
-    for (var rest = need; rest != 0u; rest &= rest - 1u) {
-        let i = countTrailingZeros(rest);
-        let offset = vec3<i32>(vec3<u32>(i & 1u, (i >> 1u) & 1u, i >> 2u));
-        let number = macrocell_linear(block + offset, frame.grid.blocks);
-        if (lru_lookup(number) == LRU_MISSING) {
-            lru_request(number);
-        }
-    }
-}
-
 // The active blocks from where the ray waits to where it crosses the coarse field.
 fn guide(ray: DdaRay, first: vec3<i32>, t_end: f32, most_blocks: u32) {
     let grid = macrocell_active(frame.grid);
@@ -56,7 +44,8 @@ fn guide(ray: DdaRay, first: vec3<i32>, t_end: f32, most_blocks: u32) {
             return;
         }
         let cell = macrocell_first_cell(grid, ray, place);
-        request(place.block, block_need(ray, cell, macrocell_box(grid, place.block)));
+        let need = block_need(ray, cell, macrocell_box(grid, place.block));
+        block_request(place.block, need, false);
         place = macrocell_leave(grid, ray, place);
     }
 }

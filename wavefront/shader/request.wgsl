@@ -2,8 +2,8 @@
 #import frame
 #import indirect
 #import macrocell_skip
-#import lru_request
 #import block_need
+#import block_request
 
 @group(0) @binding(0) var<uniform> frame: FrameParams;
 @group(0) @binding(1) var<storage, read_write> rays: array<u32>;
@@ -20,26 +20,6 @@ fn lru_params() -> LruParams {
 
 fn macrocell_mask(index: u32) -> vec2<u32> {
     return masks[index];
-}
-
-// Keeps or requests the needed ones of a block and its plus-side neighbours.
-fn request(block: vec3<i32>, need: u32, leads: bool) {
-    var led = 0u;
-    for (var rest = need; rest != 0u; rest &= rest - 1u) {
-        let i = countTrailingZeros(rest);
-        let offset = vec3<i32>(vec3<u32>(i & 1u, (i >> 1u) & 1u, i >> 2u));
-        let number = macrocell_linear(block + offset, frame.grid.blocks);
-        let slot = lru_lookup(number);
-        if (slot != LRU_MISSING) {
-            lru_keep(slot);
-        } else if (!leads) {
-            lru_request(number);
-        }
-        if (leads) {
-            lru_lead(led, number);
-            led++;
-        }
-    }
 }
 
 // Active blocks that a ray requests: twice as many after every round in which it went on and missed a
@@ -65,7 +45,7 @@ fn request_ahead(grid: MacrocellGrid, ray: DdaRay, block: vec3<i32>, count: u32,
         }
         let first = macrocell_first_cell(grid, ray, place);
         let need = block_need(ray, first, macrocell_box(grid, place.block));
-        request(place.block, need, leads && ahead == 0u);
+        block_request(place.block, need, leads && ahead == 0u);
     }
 }
 

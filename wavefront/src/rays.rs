@@ -23,6 +23,9 @@ const WORK: Module = Module { name: "work", source: include_str!("../shader/lib/
 const LIST: Module = Module { name: "list", source: include_str!("../shader/list.wgsl") };
 pub(crate) const BLOCK_NEED: Module =
     Module { name: "block_need", source: include_str!("../shader/lib/block_need.wgsl") };
+/// Asking for those that are missing.
+pub(crate) const BLOCK_REQUEST: Module =
+    Module { name: "block_request", source: include_str!("../shader/lib/block_request.wgsl") };
 const START: Module = Module { name: "start", source: include_str!("../shader/start.wgsl") };
 const RESOLVE: Module = Module { name: "resolve", source: include_str!("../shader/resolve.wgsl") };
 
@@ -97,6 +100,7 @@ pub(crate) fn library(samples: SampleLayout) -> Vec<Module> {
         FRAME,
         CELL,
         BLOCK_NEED,
+        BLOCK_REQUEST,
         BLOCK_WALK,
         WORK,
         samples.module(),

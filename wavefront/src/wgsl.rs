@@ -14,9 +14,12 @@ pub const SHADING: Module = outputs::SHADING;
 /// Which blocks hold the samples of a ray's cells in a block.
 pub const BLOCK_NEED: Module = rays::BLOCK_NEED;
 
+/// Keeping or requesting those blocks.
+pub const BLOCK_REQUEST: Module = rays::BLOCK_REQUEST;
+
 /// Everything a kernel needs to import from this crate, with what that imports.
 pub fn modules() -> Vec<Module> {
-    let mut modules = vec![FRAME, SHADING, BLOCK_NEED];
+    let mut modules = vec![FRAME, SHADING, BLOCK_NEED, BLOCK_REQUEST];
     modules.extend(macrocell::wgsl::MODULES);
     modules.extend(lru_cache_gpu::wgsl::MODULES);
     modules
