@@ -48,7 +48,7 @@ struct Arguments {
     #[arg(long, default_value_t = 6)]
     frames: u32,
     /// Width and height of the pictures.
-    #[arg(long, default_value = "384x288", value_parser = size)]
+    #[arg(long, default_value = "384x288", value_parser = support::picture_size)]
     size: [u32; 2],
     /// Everything random follows from it.
     #[arg(long, default_value_t = 1)]
@@ -59,12 +59,6 @@ struct Arguments {
     /// Part of an adapter's name.
     #[arg(long)]
     adapter: Option<String>,
-}
-
-fn size(text: &str) -> Result<[u32; 2], String> {
-    let (width, height) = text.split_once('x').ok_or("expected WIDTHxHEIGHT")?;
-    let edge = |text: &str| text.parse().map_err(|error| format!("{text}: {error}"));
-    Ok([edge(width)?, edge(height)?])
 }
 
 fn main() {

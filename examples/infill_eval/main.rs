@@ -50,7 +50,7 @@ struct Arguments {
     #[arg(long, value_enum, default_value = "default")]
     set: Set,
     /// Width and height of the pictures.
-    #[arg(long, default_value = "640x360", value_parser = size)]
+    #[arg(long, default_value = "640x360", value_parser = support::picture_size)]
     size: [u32; 2],
     /// These volumes only.
     #[arg(long, value_delimiter = ',')]
@@ -58,12 +58,6 @@ struct Arguments {
     /// Part of an adapter's name.
     #[arg(long)]
     adapter: Option<String>,
-}
-
-fn size(text: &str) -> Result<[u32; 2], String> {
-    let (width, height) = text.split_once('x').ok_or("expected WIDTHxHEIGHT")?;
-    let edge = |text: &str| text.parse().map_err(|error| format!("{text}: {error}"));
-    Ok([edge(width)?, edge(height)?])
 }
 
 impl Set {

@@ -110,48 +110,55 @@ impl Gpu {
 pub fn read_texture(gpu: &Gpu, texture: &wgpu::Texture) -> Result<Vec<u8>, Failure> {
     let row = u64::from(texture.width()) * 4;
     let padded = row.next_multiple_of(u64::from(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT));
-    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("example.read_texture"),
-        size: padded * u64::from(texture.height()),
-        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    });
     let layout = wgpu::TexelCopyBufferLayout {
         offset: 0,
         bytes_per_row: Some(padded as u32),
         rows_per_image: None,
     };
-    let target = wgpu::TexelCopyBufferInfo { buffer: &buffer, layout };
-    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    encoder.copy_texture_to_buffer(texture.as_image_copy(), target, texture.size());
-    encoder.map_buffer_on_submit(&buffer, wgpu::MapMode::Read, .., |_| {});
-    #[expect(clippy::disallowed_methods, reason = "the program owns the queue")]
-    gpu.queue.submit([encoder.finish()]);
-    #[expect(clippy::disallowed_methods, reason = "the program may block")]
-    gpu.device.poll(wgpu::PollType::wait_indefinitely())?;
-    let view = buffer.get_mapped_range(..)?;
-    let rows = view.chunks_exact(padded as usize);
+    let bytes = read_back(gpu, padded * u64::from(texture.height()), |encoder, buffer| {
+        let target = wgpu::TexelCopyBufferInfo { buffer, layout };
+        encoder.copy_texture_to_buffer(texture.as_image_copy(), target, texture.size());
+    })?;
+    let rows = bytes.chunks_exact(padded as usize);
     Ok(rows.flat_map(|padded| &padded[..row as usize]).copied().collect())
 }
 
 /// Reads a buffer that has the usage `COPY_SRC` back as words, blocking on the device.
 pub fn read_words(gpu: &Gpu, source: &wgpu::Buffer) -> Result<Vec<u32>, Failure> {
+    let bytes = read_back(gpu, source.size(), |encoder, buffer| {
+        encoder.copy_buffer_to_buffer(source, 0, buffer, 0, source.size());
+    })?;
+    let word = |b: &[u8]| u32::from_le_bytes([b[0], b[1], b[2], b[3]]);
+    Ok(bytes.chunks_exact(4).map(word).collect())
+}
+
+/// The bytes that `copy` records into a buffer of this size.
+fn read_back(
+    gpu: &Gpu,
+    size: u64,
+    copy: impl FnOnce(&mut wgpu::CommandEncoder, &wgpu::Buffer),
+) -> Result<Vec<u8>, Failure> {
     let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("example.read_words"),
-        size: source.size(),
+        label: Some("example.read_back"),
+        size,
         usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
         mapped_at_creation: false,
     });
     let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    encoder.copy_buffer_to_buffer(source, 0, &buffer, 0, source.size());
+    copy(&mut encoder, &buffer);
     encoder.map_buffer_on_submit(&buffer, wgpu::MapMode::Read, .., |_| {});
     #[expect(clippy::disallowed_methods, reason = "the program owns the queue")]
     gpu.queue.submit([encoder.finish()]);
     #[expect(clippy::disallowed_methods, reason = "the program may block")]
     gpu.device.poll(wgpu::PollType::wait_indefinitely())?;
-    let view = buffer.get_mapped_range(..)?;
-    let word = |b: &[u8]| u32::from_le_bytes([b[0], b[1], b[2], b[3]]);
-    Ok(view.chunks_exact(4).map(word).collect())
+    Ok(buffer.get_mapped_range(..)?.to_vec())
+}
+
+/// Width and height from `WIDTHxHEIGHT`, for command lines.
+pub fn picture_size(text: &str) -> Result<[u32; 2], String> {
+    let (width, height) = text.split_once('x').ok_or("expected WIDTHxHEIGHT")?;
+    let edge = |text: &str| text.parse().map_err(|error| format!("{text}: {error}"));
+    Ok([edge(width)?, edge(height)?])
 }
 
 /// Resident memory of this process in bytes, now and at its peak; `None` where the system does not
