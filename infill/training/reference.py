@@ -4,7 +4,7 @@
     python reference.py onnx MODEL.onnx WEIGHTS.safetensors OUT.safetensors   the published ones, by ONNX Runtime
 
 The first is committed as ../tests/data/published.safetensors. For the second, name OUT in PUBLISHED_INFILL_VECTOR and run
-`cargo test -p infill --features published-network`. A file has the weights, `color` [frames, h, w, 4] and `status`
+`cargo test -p infill --features published-network -- --ignored`. A file has the weights, `color` [frames, h, w, 4] and `status`
 [frames, h, w] in bytes and `filled` [frames, h, w, 3].
 """
 
