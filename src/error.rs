@@ -62,6 +62,9 @@ pub enum Error {
         "this in-fill was not planned: set RendererOptions::infill, with weights for the network"
     )]
     InfillNotPlanned,
+    /// [`crate::RendererOptions::foveation`] was not set.
+    #[error("foveation was not planned: set RendererOptions::foveation")]
+    FoveationNotPlanned,
     /// No frame has been set.
     #[error("no frame has been set")]
     NoFrame,

@@ -35,7 +35,8 @@ pub use volume::{CompressedVolume, StreamBytes};
 #[cfg(feature = "block-sorted")]
 pub use wavefront::BlockSortedOptions;
 pub use wavefront::{
-    Camera, DEPTH_NONE, DrawTarget, FrameView, Light, OutputTextures, Outputs, PixelStatus, Shading,
+    BlueNoise, Camera, DEPTH_NONE, DrawTarget, Foveation, FrameView, Light, OutputTextures,
+    Outputs, PixelStatus, Shading,
 };
 pub use wgpu;
 pub use zfp_gpu::StreamLayout;

@@ -1,7 +1,7 @@
 //! What a caller chooses.
 
 use infill::{Sources, Weights};
-use wavefront::{Camera, DrawTarget, Outputs, Shading};
+use wavefront::{BlueNoise, Camera, DrawTarget, Foveation, Outputs, Shading};
 
 use crate::Error;
 
@@ -73,6 +73,8 @@ pub struct RendererOptions {
     pub draw_target: Option<DrawTarget>,
     /// What filling unfinished pixels needs, and adds the outputs depth and normal; `None`: they are never filled.
     pub infill: Option<InfillOptions>,
+    /// What [`FrameOptions::foveation`] needs: [`BlueNoise::tiles`]. `None`: every pass works on all rays.
+    pub foveation: Option<&'static BlueNoise>,
     /// Whether pictures will be read back with [`crate::ProgressiveIsoRenderer::capture`].
     pub capture: bool,
     /// How rays find the surface.
@@ -93,6 +95,7 @@ impl Default for RendererOptions {
             outputs: Outputs::default(),
             draw_target: None,
             infill: None,
+            foveation: None,
             capture: false,
             strategy: TraversalStrategy::RunAhead,
             residency: Residency::Auto,
@@ -109,7 +112,7 @@ impl RendererOptions {
         Outputs { depth, normal: self.outputs.normal || infill, ..self.outputs }
     }
 
-    /// Whether a frame may be filled and guided as it asks.
+    /// Whether a frame may be filled, guided and foveated as it asks.
     pub(crate) fn check_frame(&self, frame: &FrameOptions) -> Result<(), Error> {
         let infill = self.infill;
         let filled = match frame.infill {
@@ -118,7 +121,14 @@ impl RendererOptions {
             Infill::Network => infill.is_some_and(|infill| infill.network.is_some()),
         };
         let guided = !frame.guided || infill.is_some_and(|infill| infill.guided);
-        if filled && guided { Ok(()) } else { Err(Error::InfillNotPlanned) }
+        if !(filled && guided) {
+            return Err(Error::InfillNotPlanned);
+        }
+        match frame.foveation {
+            Some(_) if self.foveation.is_none() => Err(Error::FoveationNotPlanned),
+            Some(foveation) => Ok(foveation.check()?),
+            None => Ok(()),
+        }
     }
 
     /// What pictures there are and where they go.
@@ -163,6 +173,11 @@ pub struct FrameOptions {
     /// and look ahead to: fewer rounds for more decoded blocks. The finished picture is the same. Needs
     /// [`InfillOptions::guided`], and does nothing where the volume is resident.
     pub guided: bool,
+    /// Where the eye looks: the first pass casts the rays of a sampling mask alone, which is dense there, and every
+    /// pass adds some, until the frame is as finished as any other. Rays that were not cast are unfinished, so
+    /// they show and are filled as those are, and count in [`crate::PassReport::active_rays`];
+    /// [`crate::PassReport::sampled_rays`] counts the mask's. Needs [`RendererOptions::foveation`].
+    pub foveation: Option<Foveation>,
     /// Completeness that is enough: from then on reports are [`crate::PassReport::stopped`] and pixels are filled,
     /// not before. Passes that are called for all the same go on. `None`: pixels are filled after every pass.
     pub stop_at: Option<Completeness>,
@@ -178,6 +193,7 @@ impl Default for FrameOptions {
             infill: Infill::Off,
             crisp_infill: false,
             guided: false,
+            foveation: None,
             stop_at: None,
         }
     }

@@ -115,7 +115,8 @@ impl ScenePlan {
         let payload = PayloadPlan::new(layout, limits)?;
         let macrocell = MacrocellPlan::new(layout.dims, limits)?;
         let outputs = options.all_outputs();
-        let wavefront = WavefrontPlan::new(options.size, outputs, limits)?;
+        let wavefront =
+            WavefrontPlan::new(options.size, outputs, limits)?.with_foveation(options.foveation);
         let strategy = StrategyPlan::new(options.strategy, wavefront.rays(), limits)?;
         let infill = options
             .infill
@@ -372,7 +373,7 @@ impl Scene<'_> {
         ]
     }
 
-    fn picture_parts(&self) -> [Part; 5] {
+    fn picture_parts(&self) -> [Part; 6] {
         let Self { options, wavefront, .. } = self;
         [
             Part::new("pictures", When::Always, wavefront.output_bytes(), picture_names(wavefront)),
@@ -393,6 +394,13 @@ impl Scene<'_> {
                     Part::new("infill", When::Rendering, plan.bytes(), infill_names(plan))
                 }
                 None => Part::left_out("infill", "not asked for"),
+            },
+            match wavefront.foveation() {
+                Some(_) => {
+                    let (bytes, why) = (wavefront.foveation_bytes(), "sampling mask, blue noise");
+                    Part::new("foveation", When::Rendering, bytes, why)
+                }
+                None => Part::left_out("foveation", "not asked for"),
             },
         ]
     }

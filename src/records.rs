@@ -55,9 +55,11 @@ pub(crate) struct PassInfo {
     pub(crate) pass: u32,
     /// Rounds recorded for the frame up to the pass, which may go on after the frame is complete.
     pub(crate) rounds: u32,
-    /// Lists of active rays made before the first round.
+    /// Lists of active rays made before the first round of each pass.
     pub(crate) lists_at_start: u32,
     pub(crate) pixels: u32,
+    /// Whether only the rays of a sampling mask are cast.
+    pub(crate) foveated: bool,
     /// Cells that its walks may visit each, and the time that the pass should take.
     pub(crate) most_cells: u32,
     pub(crate) pass_ms: f32,
@@ -255,6 +257,7 @@ impl PassRecords {
         report.cpu_ms = info.cpu_ms;
         report.gpu_ms = gpu_ms;
         report.rays = info.pixels;
+        report.sampled_rays = if info.foveated { record.rays.sampled } else { info.pixels };
         report.entered_rays = record.rays.entered;
         report.active_rays = record.rays.active;
         report.most_cells = record.rays.most_cells;

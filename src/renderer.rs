@@ -8,7 +8,7 @@ use gpu_primitives::kernel::dispatches_recorded;
 use gpu_primitives::memory::{Category, Ledger};
 use gpu_primitives::upload::UploadRing;
 use infill::Method;
-use wavefront::{FrameView, LookAhead, OutputTextures, ShadingParams};
+use wavefront::{FrameView, LookAhead, OutputTextures, SamplingParams, ShadingParams};
 use web_time::Instant;
 
 use crate::capture::PendingCapture;
@@ -84,6 +84,21 @@ struct FrameState {
     most_cells: u32,
     passes: u32,
     rounds: u32,
+}
+
+impl FrameState {
+    /// What the next pass adds to the sampling mask of a foveated frame, if anything.
+    fn sampling(&self, size: [u32; 2]) -> Option<SamplingParams> {
+        let foveation = self.frame.options.foveation?;
+        let adds = self.passes < foveation.passes;
+        adds.then(|| SamplingParams::new(&foveation, size, self.number, self.passes))
+    }
+
+    /// Lists of rays made before the first rounds of the passes after the first, so far.
+    fn lists_between(&self) -> u32 {
+        let passes = self.frame.options.foveation.map_or(1, |foveation| foveation.passes);
+        self.passes.clamp(1, passes) - 1
+    }
 }
 
 impl ProgressiveIsoRenderer {
@@ -350,6 +365,12 @@ impl ProgressiveIsoRenderer {
         let (Phase::Rendering(rendering), Some(state)) = (&self.phase, &mut self.frame) else {
             return;
         };
+        if state.passes > 0
+            && let Some(sampling) = state.sampling(self.options.size)
+        {
+            let (stages, upload) = (&self.stages, &mut self.upload);
+            rendering.record_mask(device, encoder, upload, stages, &sampling);
+        }
         state.passes += 1;
         let options = &state.frame.options;
         for _ in 0..self.records.schedule.rounds(options.rounds_per_pass, options.pass_ms) {
@@ -404,7 +425,9 @@ impl ProgressiveIsoRenderer {
             rendering.record_infill_start(device, encoder, upload, stages, next, follows, look);
         }
         self.shown_isovalue = Some(isovalue);
-        rendering.record_start(device, encoder, upload, stages, &params, &shading);
+        let sampling = state.sampling(self.options.size);
+        let sampling = sampling.as_ref();
+        rendering.record_start(device, encoder, upload, stages, &params, &shading, sampling);
         if let (Some(draw), Some(buffers)) = (&stages.draw, &self.pictures.draw) {
             draw.record_params(device, encoder, upload, buffers, &state.view);
         }
@@ -430,6 +453,8 @@ impl ProgressiveIsoRenderer {
         let pass_ms = state.map_or(0.0, |state| state.frame.options.pass_ms);
         let stop_at = state.and_then(|state| state.frame.options.stop_at).map(|stop| stop.0);
         let fills = state.is_some_and(|state| state.frame.options.infill != Infill::Off);
+        let lists_at_start = lists_at_start + state.map_or(0, FrameState::lists_between);
+        let foveated = state.is_some_and(|state| state.frame.options.foveation.is_some());
         let [width, height] = self.options.size;
         let cpu_ms = begin.elapsed().as_secs_f64() * 1e3;
         let pixels = width * height;
@@ -439,6 +464,7 @@ impl ProgressiveIsoRenderer {
             rounds,
             lists_at_start,
             pixels,
+            foveated,
             most_cells,
             pass_ms,
             stop_at,

@@ -18,10 +18,12 @@ pub struct PassReport {
     pub newest_frame: u64,
     /// The pass described, counted from 1 within its frame; 0 when none has finished yet.
     pub pass: u32,
-    /// Rounds of the frame up to and including that pass; those that found no ray active do not count.
+    /// Rounds of the frame up to and including that pass; those that found no ray to work on do not count.
     pub rounds: u32,
     /// Pixels, hence rays.
     pub rays: u32,
+    /// Pixels whose rays the frame has had cast so far: all, or those of the sampling mask of a foveated frame.
+    pub sampled_rays: u32,
     /// Rays that enter the volume.
     pub entered_rays: u32,
     /// Rays that are not finished.

@@ -6,7 +6,7 @@ use infill::{Guide, GuideBinds, GuideScene, InfillBuffers, Method, Weights};
 use macrocell::{Activate, Masks, RangeBuffers};
 use wavefront::{
     Draw, DrawBuffers, FrameParams, FrameView, OutputTextures, RayBuffers, Rays, Rounds, Samples,
-    Scene, ShadingParams, Strategy,
+    SamplingParams, Scene, ShadingParams, Strategy,
 };
 use zfp_gpu::Payload;
 
@@ -68,7 +68,10 @@ impl Stages {
         Ok(Self {
             activate: Activate::new(device, plan.macrocell.grid().has_third_level()),
             samples: SampleStages::new(device, &plan.samples)?,
-            rays: Rays::new(device, plan.wavefront.outputs(), layout),
+            rays: match options.foveation {
+                Some(_) => Rays::with_foveation(device, plan.wavefront.outputs(), layout),
+                None => Rays::new(device, plan.wavefront.outputs(), layout),
+            },
             strategy: plan.strategy.pipelines(device, layout),
             draw: options.draw_target.map(|target| Draw::new(device, &target)),
             infill: plan.infill.as_ref().map(|plan| InfillStage {
@@ -182,9 +185,22 @@ impl Rendering {
         stages: &Stages,
         params: &FrameParams,
         shading: &ShadingParams,
+        sampling: Option<&SamplingParams>,
     ) {
-        stages.rays.record_start(device, encoder, upload, &self.rays, params, shading);
+        stages.rays.record_start(device, encoder, upload, &self.rays, params, shading, sampling);
         self.rounds.record_start(encoder, &stages.rays, &self.rays);
+    }
+
+    /// Records that another pass of a foveated frame casts more rays.
+    pub(crate) fn record_mask(
+        &self,
+        device: &wgpu::Device,
+        encoder: &mut wgpu::CommandEncoder,
+        upload: &mut UploadRing,
+        stages: &Stages,
+        sampling: &SamplingParams,
+    ) {
+        stages.rays.record_mask(device, encoder, upload, &self.rays, sampling);
     }
 
     /// Records what in-fill keeps of the previous frame: before the new one starts.

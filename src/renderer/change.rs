@@ -38,6 +38,7 @@ impl ProgressiveIsoRenderer {
         let (layout, strategy) = (plan.samples.layout(), plan.strategy);
         if pictures
             || options.infill != self.options.infill
+            || options.foveation != self.options.foveation
             || (layout, strategy) != (self.plan.samples.layout(), self.plan.strategy)
         {
             self.stages = self

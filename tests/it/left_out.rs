@@ -3,8 +3,8 @@
 use gpu_primitives::kernel::dispatches_recorded;
 use gpu_testkit::gpu;
 use progressive_iso::{
-    BlockSortedOptions, Category, DrawTarget, Outputs, PassReport, ProgressiveIsoRenderer,
-    RendererOptions, TraversalStrategy, wgpu,
+    BlockSortedOptions, BlueNoise, Category, DrawTarget, Outputs, PassReport,
+    ProgressiveIsoRenderer, RendererOptions, TraversalStrategy, wgpu,
 };
 
 use crate::support::{Scene, options};
@@ -110,6 +110,24 @@ fn the_other_strategy_is_left_out() {
     // One kernel against eight of its own and those of scan, compaction and arguments.
     assert!(ours.compute_pipelines + 7 <= published.compute_pipelines, "{ours:?} {published:?}");
     assert!(ours.dispatches + 7 <= published.dispatches, "{ours:?} {published:?}");
+}
+
+#[test]
+fn foveation_is_left_out_unless_asked_for() {
+    let scene = Scene::generated("gyroid", [20, 21, 22], 8.0);
+    let without = options([40, 30]);
+    let with = RendererOptions { foveation: Some(BlueNoise::tiles()), ..without };
+    assert_eq!(part_bytes(&scene, without, "foveation"), (false, 0));
+    let bytes = part_bytes(&scene, with, "foveation").1;
+    // The tiles, a bit for each of 64x32 rays, a uniform and arguments.
+    assert_eq!(bytes, 128 * 1024 + 64 * 32 / 8 + 32 + 16);
+    let slots = Some(100);
+    let [without, with] =
+        [without, with].map(|o| cost(&scene, RendererOptions { most_slots: slots, ..o }));
+    assert_eq!(without.compute_pipelines + 1, with.compute_pipelines);
+    assert_eq!(without.bytes + bytes, with.bytes);
+    // A frame without it pays nothing for the plan.
+    assert_eq!(without.dispatches, with.dispatches);
 }
 
 #[test]

@@ -11,6 +11,7 @@ mod counters;
 mod draw;
 mod errors;
 mod faults;
+mod foveation;
 mod infill;
 mod invariance;
 mod left_out;

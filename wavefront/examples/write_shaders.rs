@@ -11,6 +11,8 @@ fn main() -> std::io::Result<()> {
         [("cached", SampleLayout::cached(3)), ("resident", SampleLayout::resident(4))]
     {
         sources.extend(Rays::sources(outputs, samples).map(|source| (name, source)));
+        let foveated = Rays::foveation_sources(samples);
+        sources.extend(foveated.map(|source| ("foveated", source)));
         sources.extend(RunAhead::sources(samples).into_iter().map(|source| (name, source)));
     }
     #[cfg(feature = "block-sorted")]

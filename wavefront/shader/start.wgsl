@@ -77,6 +77,7 @@ fn main(
         atomicAdd(&rays[RAYS_ENTERED], atomicLoad(&entered));
     }
     if (id == 0u) {
-        atomicStore(&rays[RAYS_ACTIVE], 1u); // the first list is to be made
+        atomicStore(&rays[RAYS_ACTIVE], 1u);
+        atomicStore(&rays[RAYS_LISTED], 1u); // the first list is to be made
     }
 }

@@ -36,6 +36,14 @@ pub enum Error {
         /// Most pixels per axis under the device's limits.
         most_edge: u32,
     },
+    /// A number of a frame's foveation is out of range.
+    #[error(
+        "{found:?}: expected finite numbers, sigma not below 0, a base density of 0 to 1 and 1 to 64 passes"
+    )]
+    Foveation {
+        /// Choice given.
+        found: crate::Foveation,
+    },
     /// The strategy decodes blocks as rays need them.
     #[error("this strategy works with a cache only, not with a volume that is resident as a whole")]
     NeedsCache,

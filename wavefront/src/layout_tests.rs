@@ -7,6 +7,7 @@ use gpu_testkit::layout::{check_struct, struct_size};
 use lru_cache_gpu::LruParams;
 
 use crate::draw::DrawParams;
+use crate::foveation::SamplingParams;
 use crate::frame::{FrameParams, GridParams};
 use crate::outputs::ShadingParams;
 use crate::{Outputs, Rays, SampleLayout};
@@ -103,6 +104,17 @@ fn the_shading_uniform_has_the_declared_layout() {
     });
     check_struct(&source, "ShadingParams", &members).unwrap();
     assert_eq!(struct_size(&source, "ShadingParams"), Ok(size_of::<ShadingParams>() as u32));
+}
+
+#[test]
+fn the_sampling_uniform_has_the_declared_layout() {
+    let [mask, ..] = Rays::foveation_sources(SampleLayout::cached(1));
+    let source = mask.wgsl.source;
+    let members =
+        members!(SamplingParams { gaze, share_per_pixel, falloff, base_density, slice, draws });
+    check_struct(&source, "SamplingParams", &members).unwrap();
+    let bytes = size_of::<SamplingParams>() as u32;
+    assert_eq!(struct_size(&source, "SamplingParams"), Ok(bytes));
 }
 
 #[test]

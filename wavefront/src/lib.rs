@@ -6,6 +6,7 @@ mod camera;
 pub mod cpu;
 pub mod draw;
 mod error;
+mod foveation;
 pub mod frame;
 #[cfg(test)]
 mod layout_tests;
@@ -23,6 +24,7 @@ pub use block_sorted::{BlockSorted, BlockSortedOptions, BlockSortedPlan};
 pub use camera::Camera;
 pub use draw::{Draw, DrawBuffers, DrawTarget};
 pub use error::Error;
+pub use foveation::{BlueNoise, Foveation, SamplingParams};
 pub use frame::{FrameParams, FrameView, LookAhead};
 pub use gpu_primitives::wgpu;
 pub use order::RayOrder;

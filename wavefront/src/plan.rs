@@ -2,6 +2,7 @@
 
 use gpu_primitives::wgpu;
 
+use crate::foveation::{BlueNoise, SamplingParams};
 use crate::frame::{FrameParams, PARAMS_BYTES};
 use crate::order::RayOrder;
 use crate::outputs::ShadingParams;
@@ -12,6 +13,9 @@ pub(crate) const RAYS_HEADER_WORDS: u64 = 12;
 
 /// Bytes of the indirect arguments of dispatches over the listed rays and over the list itself.
 pub(crate) const ARGS_BYTES: u64 = 32;
+
+/// Those of the list's first kernel where a sampling mask may empty the list before all rays are finished.
+pub(crate) const MASKED_LIST_ARGS_BYTES: u64 = 16;
 
 /// Bytes of the indirect arguments of the list's second kernel.
 pub(crate) const FILL_ARGS_BYTES: u64 = 16;
@@ -32,6 +36,7 @@ pub(crate) fn list_capacity(size: [u32; 2]) -> u64 {
 pub struct WavefrontPlan {
     size: [u32; 2],
     outputs: Outputs,
+    foveation: Option<&'static BlueNoise>,
 }
 
 impl WavefrontPlan {
@@ -43,7 +48,7 @@ impl WavefrontPlan {
         let [width, height] = size;
         let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let most_edge = limits.max_texture_dimension_2d;
-        let plan = Self { size, outputs };
+        let plan = Self { size, outputs, foveation: None };
         let fits = width > 0 && height > 0 && width <= most_edge && height <= most_edge;
         if !fits || plan.state_bytes() > binding {
             // About: what lies outside the picture in its last squares counts, too.
@@ -51,6 +56,17 @@ impl WavefrontPlan {
             return Err(Error::PictureSize { width, height, most, most_edge });
         }
         Ok(plan)
+    }
+
+    /// The same with what [`crate::Foveation`] needs.
+    #[must_use]
+    pub fn with_foveation(self, tiles: Option<&'static BlueNoise>) -> Self {
+        Self { foveation: tiles, ..self }
+    }
+
+    /// Tiles of the sampling masks.
+    pub fn foveation(&self) -> Option<&'static BlueNoise> {
+        self.foveation
     }
 
     /// Width and height in pixels.
@@ -94,6 +110,17 @@ impl WavefrontPlan {
             + size_of::<ShadingParams>() as u64
     }
 
+    /// Bytes of the sampling mask.
+    pub(crate) fn mask_bytes(&self) -> u64 {
+        self.numbers() / 8
+    }
+
+    /// Bytes of the sampling mask and what makes it.
+    pub fn foveation_bytes(&self) -> u64 {
+        let beside = BlueNoise::BYTES + SamplingParams::BYTES + MASKED_LIST_ARGS_BYTES;
+        self.foveation.map_or(0, |_| self.mask_bytes() + beside)
+    }
+
     /// Bytes of the pictures.
     pub fn output_bytes(&self) -> u64 {
         self.rays() * self.outputs.bytes_per_pixel()
@@ -101,7 +128,7 @@ impl WavefrontPlan {
 
     /// Everything together.
     pub fn bytes(&self) -> u64 {
-        self.ray_bytes() + self.output_bytes()
+        self.ray_bytes() + self.foveation_bytes() + self.output_bytes()
     }
 }
 

@@ -9,9 +9,12 @@ use gpu_primitives::upload::UploadRing;
 use gpu_primitives::wgsl::{Constant, Module, compose_fixed};
 use gpu_primitives::{indirect, wgpu};
 
+use crate::foveation::{SamplingParams, mask_source};
 use crate::frame::{FrameParams, PARAMS_BYTES};
 use crate::outputs::{OUTPUTS, OutputTextures, Outputs, SHADING, ShadingParams};
-use crate::plan::{ARGS_BYTES, FILL_ARGS_BYTES, RAYS_HEADER_WORDS, WavefrontPlan};
+use crate::plan::{
+    ARGS_BYTES, FILL_ARGS_BYTES, MASKED_LIST_ARGS_BYTES, RAYS_HEADER_WORDS, WavefrontPlan,
+};
 use crate::samples::{SampleLayout, Samples};
 
 pub(crate) const FRAME: Module =
@@ -71,7 +74,9 @@ pub struct Counters {
     open_now: u32,
     /// Bits of [`Counters::open_depth_voxels`].
     open: u32,
-    pad: [u32; 2],
+    masked: u32,
+    /// Pixels whose rays the sampling mask has had cast so far in the frame; 0 without one.
+    pub sampled: u32,
 }
 
 impl Counters {
@@ -92,6 +97,8 @@ pub struct Rays {
     resolve: Kernel,
     list_sum: Kernel,
     list_fill: Kernel,
+    /// None unless frames may be foveated.
+    sampling_mask: Option<Kernel>,
 }
 
 /// Every module that a kernel of this crate may import.
@@ -141,7 +148,16 @@ impl Rays {
     pub fn new(device: &wgpu::Device, outputs: Outputs, samples: SampleLayout) -> Self {
         let [start, resolve, list_sum, list_fill] =
             Self::sources(outputs, samples).map(|s| s.kernel(device));
-        Self { start, resolve, list_sum, list_fill }
+        Self { start, resolve, list_sum, list_fill, sampling_mask: None }
+    }
+
+    /// The same for pictures whose frames may be foveated.
+    pub fn with_foveation(device: &wgpu::Device, outputs: Outputs, samples: SampleLayout) -> Self {
+        let [start, resolve, ..] = Self::sources(outputs, samples);
+        let [start, resolve] = [start, resolve].map(|s| s.kernel(device));
+        let [sampling_mask, list_sum, list_fill] =
+            Self::foveation_sources(samples).map(|s| s.kernel(device));
+        Self { start, resolve, list_sum, list_fill, sampling_mask: Some(sampling_mask) }
     }
 
     /// Texts and bindings of the kernels.
@@ -150,17 +166,33 @@ impl Rays {
         let start = vec![FRAME_PARAMS, shading, RAYS, MASKS];
         let mut resolve = vec![FRAME_PARAMS, shading, RAYS];
         resolve.extend(samples.bindings());
-        let list = vec![FRAME_PARAMS, RAYS, WRITE, WRITE];
-        let fill = [("LIST_FILL", Constant::Bool(true))];
+        let [list_sum, list_fill] = Self::list_sources(samples, false);
         [
             source("wavefront.start", START, start, samples, &[], Some(outputs)),
             source("wavefront.resolve", RESOLVE, resolve, samples, &[], Some(outputs)),
-            source("wavefront.list.sum", LIST, list.clone(), samples, &[], None),
-            source("wavefront.list.fill", LIST, list, samples, &fill, None),
+            list_sum,
+            list_fill,
         ]
     }
 
-    /// Records the start of a frame: clears the pictures and lists the rays that enter the volume.
+    /// Texts and bindings of the kernels that make a sampling mask and list only the rays that it has.
+    pub fn foveation_sources(samples: SampleLayout) -> [KernelSource; 3] {
+        let [list_sum, list_fill] = Self::list_sources(samples, true);
+        [mask_source(samples), list_sum, list_fill]
+    }
+
+    fn list_sources(samples: SampleLayout, foveation: bool) -> [KernelSource; 2] {
+        let mut bindings = vec![FRAME_PARAMS, RAYS, WRITE, WRITE];
+        bindings.extend(foveation.then_some(READ));
+        [("wavefront.list.sum", false), ("wavefront.list.fill", true)].map(|(label, fill)| {
+            let constants =
+                [("LIST_FILL", Constant::Bool(fill)), ("FOVEATION", Constant::Bool(foveation))];
+            source(label, LIST, bindings.clone(), samples, &constants, None)
+        })
+    }
+
+    /// Records the start of a frame: clears the pictures and lists the rays that enter the volume, those of
+    /// the `sampling` mask alone if there is one.
     pub fn record_start(
         &self,
         device: &wgpu::Device,
@@ -169,16 +201,48 @@ impl Rays {
         buffers: &RayBuffers,
         frame: &FrameParams,
         shading: &ShadingParams,
+        sampling: Option<&SamplingParams>,
     ) {
         upload.write(device, encoder, &buffers.frame, 0, bytemuck::bytes_of(frame));
         upload.write(device, encoder, &buffers.shading, 0, bytemuck::bytes_of(shading));
         encoder.clear_buffer(&buffers.rays, 0, Some(4 * RAYS_HEADER_WORDS));
-        let mut pass = begin(encoder, "wavefront.start");
-        let groups = buffers.plan.numbers() / u64::from(RAYS_PER_GROUP);
-        self.start.dispatch(&mut pass, &buffers.start, groups);
+        {
+            let mut pass = begin(encoder, "wavefront.start");
+            let groups = buffers.plan.numbers() / u64::from(RAYS_PER_GROUP);
+            self.start.dispatch(&mut pass, &buffers.start, groups);
+        }
+        if let (Some(sampling), Some(foveation)) = (sampling, &buffers.foveation) {
+            encoder.clear_buffer(&foveation.mask, 0, None);
+            self.record_mask(device, encoder, upload, buffers, sampling);
+        } else {
+            self.record_list(&mut begin(encoder, "wavefront.list"), buffers);
+        }
+    }
+
+    /// Records that the rays of another pass of a foveated frame may be cast, too. Nothing unless the plan has
+    /// foveation.
+    pub fn record_mask(
+        &self,
+        device: &wgpu::Device,
+        encoder: &mut wgpu::CommandEncoder,
+        upload: &mut UploadRing,
+        buffers: &RayBuffers,
+        sampling: &SamplingParams,
+    ) {
+        if let (Some(kernel), Some(foveation)) = (&self.sampling_mask, &buffers.foveation) {
+            upload.write(device, encoder, &foveation.params, 0, bytemuck::bytes_of(sampling));
+            let mut pass = begin(encoder, "wavefront.sampling_mask");
+            let groups = buffers.plan.numbers() / u64::from(RAYS_PER_GROUP);
+            kernel.dispatch(&mut pass, &foveation.bind, groups);
+            self.record_list(&mut pass, buffers);
+        }
+    }
+
+    /// Records the list of the active rays, whatever it was before.
+    fn record_list(&self, pass: &mut wgpu::ComputePass<'_>, buffers: &RayBuffers) {
         let groups = buffers.plan.list_groups();
-        self.list_sum.dispatch(&mut pass, &buffers.list_sum, groups);
-        self.list_fill.dispatch(&mut pass, &buffers.list_fill, groups);
+        self.list_sum.dispatch(pass, &buffers.list_sum, groups);
+        self.list_fill.dispatch(pass, &buffers.list_fill, groups);
     }
 
     /// Records the shading of new hits and the new list of active rays: the end of every round.
@@ -191,13 +255,22 @@ impl Rays {
         }
         let mut pass = begin(encoder, "wavefront.list");
         let (sum, fill) = (&buffers.list_sum, &buffers.list_fill);
-        self.list_sum.dispatch_indirect(&mut pass, sum, &buffers.args, LIST_ARGS_OFFSET);
+        self.list_sum.dispatch_indirect(&mut pass, sum, &buffers.args, buffers.list_args_offset());
         self.list_fill.dispatch_indirect(&mut pass, fill, &buffers.fill_args, 0);
     }
 }
 
 /// Where the arguments of the list's first kernel are in [`RayBuffers::args`].
 const LIST_ARGS_OFFSET: u64 = 16;
+
+/// The sampling mask of one picture.
+#[derive(Debug)]
+struct FoveationBuffers {
+    params: Buffer,
+    mask: Buffer,
+    bind: wgpu::BindGroup,
+    _tiles: Buffer,
+}
 
 /// Ray states, the active list and scratch memory of one picture.
 #[derive(Debug)]
@@ -212,12 +285,14 @@ pub struct RayBuffers {
     resolve: wgpu::BindGroup,
     list_sum: wgpu::BindGroup,
     list_fill: wgpu::BindGroup,
+    foveation: Option<FoveationBuffers>,
     _sums: Buffer,
 }
 
 impl RayBuffers {
     /// Allocates the state of one picture. `masks` are the active masks, as `macrocell` makes them;
-    /// `textures` have the plan's outputs and size.
+    /// `textures` have the plan's outputs and size. `stage` is [`Rays::with_foveation`] if and only if the plan has
+    /// foveation.
     pub fn new(
         device: &wgpu::Device,
         ledger: &Ledger,
@@ -245,15 +320,20 @@ impl RayBuffers {
             buffer(Category::Scratch, label, bytes, Usage::STORAGE | Usage::INDIRECT)
         };
         let fill_args = args("wavefront.list.fill_args", FILL_ARGS_BYTES);
-        let args = args("wavefront.args", ARGS_BYTES);
+        let masked_args = plan.foveation().map_or(0, |_| MASKED_LIST_ARGS_BYTES);
+        let args = args("wavefront.args", ARGS_BYTES + masked_args);
+        let foveation = FoveationBuffers::new(device, ledger, stage, plan, [&frame, &rays]);
         let views = || textures.views().iter().map(wgpu::BindingResource::TextureView);
         let mut start = resources(&[&frame, &shading, &rays, masks]);
         start.extend(views());
         let mut resolve = resources(&[&frame, &shading, &rays]);
         resolve.extend(samples.resources());
         resolve.extend(views());
-        let sum = resources(&[&frame, &rays, &sums, &fill_args]);
-        let fill = resources(&[&frame, &rays, &sums, &args]);
+        let mask = foveation.as_ref().map(|foveation| foveation.mask.as_entire_binding());
+        let mut sum = resources(&[&frame, &rays, &sums, &fill_args]);
+        sum.extend(mask.clone());
+        let mut fill = resources(&[&frame, &rays, &sums, &args]);
+        fill.extend(mask);
         Self {
             start: stage.start.bind(device, "wavefront.start", &start),
             resolve: stage.resolve.bind(device, "wavefront.resolve", &resolve),
@@ -265,13 +345,24 @@ impl RayBuffers {
             shading,
             args,
             fill_args,
+            foveation,
             _sums: sums,
         }
+    }
+
+    /// Where the arguments of the list's first kernel are in [`Self::args`].
+    fn list_args_offset(&self) -> u64 {
+        if self.foveation.is_some() { ARGS_BYTES } else { LIST_ARGS_OFFSET }
     }
 
     /// Header, states, active bits and list of the rays, as in `shader/lib/frame.wgsl`.
     pub fn rays(&self) -> &wgpu::Buffer {
         &self.rays
+    }
+
+    /// The sampling mask, a bit for every ray's number, if the plan has foveation; stale in a frame without it.
+    pub fn sampling_mask(&self) -> Option<&wgpu::Buffer> {
+        self.foveation.as_ref().map(|foveation| &*foveation.mask)
     }
 
     /// The plan these buffers were made from.
@@ -298,6 +389,35 @@ impl RayBuffers {
     /// Arguments of a dispatch over the listed rays.
     pub(crate) fn args(&self) -> &wgpu::Buffer {
         &self.args
+    }
+}
+
+impl FoveationBuffers {
+    /// None unless both the stage and the plan have foveation.
+    fn new(
+        device: &wgpu::Device,
+        ledger: &Ledger,
+        stage: &Rays,
+        plan: &WavefrontPlan,
+        [frame, rays]: [&wgpu::Buffer; 2],
+    ) -> Option<Self> {
+        use wgpu::BufferUsages as Usage;
+        let (kernel, tiles) = (stage.sampling_mask.as_ref()?, plan.foveation()?);
+        let buffer = |category, label, size, usage| {
+            let label = Some(label);
+            let desc = wgpu::BufferDescriptor { label, size, usage, mapped_at_creation: false };
+            ledger.buffer(device, category, &desc)
+        };
+        let uniform = Usage::UNIFORM | Usage::COPY_DST;
+        let params = buffer(Category::Params, "wavefront.sampling", SamplingParams::BYTES, uniform);
+        let storage = Usage::STORAGE | Usage::COPY_DST | Usage::COPY_SRC;
+        let mask = buffer(Category::Rays, "wavefront.mask", plan.mask_bytes(), storage);
+        let bytes = bytemuck::cast_slice(tiles.ranks());
+        let label = "wavefront.blue_noise";
+        let tiles = ledger.buffer_with(device, Category::Rays, label, Usage::STORAGE, bytes);
+        let bind = resources(&[frame, &params, rays, &tiles, &mask]);
+        let bind = kernel.bind(device, "wavefront.sampling_mask", &bind);
+        Some(Self { params, mask, bind, _tiles: tiles })
     }
 }
 

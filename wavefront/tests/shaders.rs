@@ -18,6 +18,7 @@ fn kernels_validate_with_every_set_of_outputs_and_pages() {
         for pages in 1..=4 {
             for samples in [SampleLayout::cached(pages), SampleLayout::resident(pages)] {
                 Rays::sources(outputs, samples).iter().for_each(check);
+                Rays::foveation_sources(samples).iter().for_each(check);
                 RunAhead::sources(samples).iter().for_each(check);
             }
         }

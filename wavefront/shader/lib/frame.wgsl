@@ -92,6 +92,8 @@ const RAYS_MOST_CELLS: u32 = 6u; // the most of any walk of the frame
 const RAYS_CUT: u32 = 7u;        // walks of a ray, so far in the frame, that the bound ended
 const RAYS_OPEN_NOW: u32 = 8u; // RAYS_OPEN of the round that is going on
 const RAYS_OPEN: u32 = 9u;     // f32 bits: most voxels in which an active ray's first hit may still lie
+const RAYS_MASKED: u32 = 10u;  // whether the sampling mask says which active rays are listed
+const RAYS_SAMPLED: u32 = 11u; // pixels of the mask
 const RAYS_HEADER: u32 = 12u;
 
 // The word that holds the active bit of a ray, which is its number's lowest five bits.

@@ -3,5 +3,6 @@
 pub mod block_walk;
 pub mod cell;
 pub mod frame;
+pub mod sampling_mask;
 pub mod shading;
 pub mod walk;

@@ -227,7 +227,7 @@ impl Stage {
         let identity = glam::DMat4::IDENTITY.to_cols_array_2d();
         let shading = ShadingParams::new(&Shading::default(), identity);
         let mut upload = UploadRing::new(&ledger, "test", 1024);
-        self.rays.record_start(device, &mut encoder, &mut upload, &rays, &params, &shading);
+        self.rays.record_start(device, &mut encoder, &mut upload, &rays, &params, &shading, None);
         rounds.record_start(&mut encoder, &self.rays, &rays);
         let mut counters = Vec::new();
         while counters.last().is_none_or(|counters: &Counters| counters.active > 0) {
