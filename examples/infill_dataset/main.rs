@@ -23,12 +23,13 @@ use sequence::{Sequence, Subject};
 use support::{Failure, Gpu};
 
 /// Kinds of volumes, in turn.
-const KINDS: [&str; 9] = [
+const KINDS: [&str; 10] = [
     "turbulence",
     "mixing-layer",
     "blobs",
     "shells",
     "sheets",
+    "rods",
     "tubes",
     "gyroid",
     "rough-solid",

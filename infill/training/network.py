@@ -7,7 +7,9 @@ from torch import nn
 # Candidates in the crate's order: neighbours (push-pull), coarse field, its thin variant, history.
 SOURCES = ["P", "L", "X", "R"]
 # `infill::PRIOR`: logarithms of the candidates' weights without a network.
-PRIOR = [0.0, 0.0, -1.4, 1.1]
+PRIOR = [1.3, 0.0, -4.3, 4.3]
+# `infill::DOUBT`: how much less neighbours that disagree weigh.
+DOUBT = 7.0
 # Voxels at which a soft distance is one half.
 HALF_DISTANCE = 8.0
 FEATURES = 16
@@ -44,7 +46,9 @@ def mix(frame, outputs):
     """Coverage and N.V of holes from the candidates and the network's outputs [n, 6, h, w]."""
     stacked = lambda name: torch.stack([frame[f"{name}_{s}"] for s in SOURCES], dim=1)
     valid, coverage, facing = stacked("v"), stacked("c"), stacked("nv")
+    doubt = DOUBT * 4 * frame["c_P"] * (1 - frame["c_P"])
     logits = outputs[:, :4] + torch.tensor(PRIOR, device=outputs.device).view(1, 4, 1, 1)
+    logits = torch.cat([logits[:, :1] - doubt.unsqueeze(1), logits[:, 1:]], dim=1)
     # A pixel without any candidate has weights of 0 and so no coverage, as in the crate.
     weights = torch.softmax(logits.masked_fill(valid == 0, -1e9), dim=1) * valid
     covered = weights * coverage

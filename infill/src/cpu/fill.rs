@@ -11,7 +11,7 @@ use super::march::march;
 use super::network::{FEATURES, Map, OUTPUTS, network};
 use super::push_pull::{Average, Pyramid};
 use super::reproject;
-use crate::options::{PRIOR, Sources};
+use crate::options::{DOUBT, PRIOR, Sources};
 use crate::weights::Weights;
 
 /// A finished pixel.
@@ -146,7 +146,9 @@ fn perpendicular(v: [f32; 3]) -> [f32; 3] {
 
 /// The mixture of a hole's candidates, with what the network says; `None` without any candidate.
 pub fn mix(candidates: &[Packed; 4], output: &[f32], to_viewer: [f32; 3]) -> Option<Filled> {
-    let logit = |i: usize| PRIOR[i] + output[i];
+    let share = candidates[0].coverage;
+    let doubt = [DOUBT * 4.0 * share * (1.0 - share), 0.0, 0.0, 0.0];
+    let logit = |i: usize| PRIOR[i] + output[i] - doubt[i];
     let valid = || (0..4).filter(|&i| candidates[i].valid);
     let most = valid().map(logit).reduce(f32::max)?;
     let (mut total, mut coverage, mut facing, mut normal) = (0.0, 0.0, 0.0, [0.0; 3]);
