@@ -27,12 +27,18 @@
 
 const LIST: u32 = 0u;
 const LANES: u32 = 64u;
+// Pixels in a row that an invocation fills: with the network as many as a strip of its convolutions has.
+#ifdef NETWORK
+const STRIP: u32 = CONV_STRIP;
+#else
+const STRIP: u32 = 1u;
+#endif
 
 var<workgroup> filled_count: atomic<u32>;
 
-fn hints(inside: vec2<u32>) -> MixHints {
+fn hints(words: vec2<u32>) -> MixHints {
 #ifdef NETWORK
-    let network = decode_pixel(inside);
+    let network = decode_head(words);
     return MixHints(network[0], network[1].xy);
 #else
     // Loaded, so that the mixture is computed as with a network of zeros.
@@ -40,10 +46,11 @@ fn hints(inside: vec2<u32>) -> MixHints {
 #endif
 }
 
-fn fill(pixel: vec2<u32>, number: u32, inside: vec2<u32>) -> bool {
+// `words`: what the network has for the pixel.
+fn fill(pixel: vec2<u32>, number: u32, words: vec2<u32>) -> bool {
     let ray = frame_ray(frame, pixel).ray;
     let to_viewer = shading_to_viewer(ray.direction);
-    let mixed = mix_candidates(features_candidates(pixel, ray, number), hints(inside), to_viewer);
+    let mixed = mix_candidates(features_candidates(pixel, ray, number), hints(words), to_viewer);
     var color = shading.unfinished;
     if (mixed.filled) {
         let coverage = select(mixed.coverage, step(0.5, mixed.coverage), params.crisp != 0u);
@@ -72,13 +79,23 @@ fn main(
 #ifdef NETWORK
     decode_tile(corner, lane);
 #endif
-    for (var i = lane; i < INFILL_TILE * INFILL_TILE; i += LANES) {
-        let inside = vec2<u32>(i % INFILL_TILE, i / INFILL_TILE);
-        let pixel = corner + inside;
-        let number = frame_number(frame, pixel);
-        if (listed && all(pixel < params.size) && infill_is_hole(number)) {
-            if (fill(pixel, number, inside)) {
-                atomicAdd(&filled_count, 1u);
+    for (var i = lane; i < INFILL_TILE * INFILL_TILE / STRIP; i += LANES) {
+        let inside = vec2<u32>(STRIP * (i % (INFILL_TILE / STRIP)), i / (INFILL_TILE / STRIP));
+#ifdef NETWORK
+        var words = decode_strip(inside);
+#endif
+        for (var k = 0u; k < STRIP; k++) {
+            let pixel = corner + inside + vec2<u32>(k, 0u);
+            let number = frame_number(frame, pixel);
+            if (listed && all(pixel < params.size) && infill_is_hole(number)) {
+#ifdef NETWORK
+                let filled = fill(pixel, number, words[k]);
+#else
+                let filled = fill(pixel, number, vec2<u32>(0u));
+#endif
+                if (filled) {
+                    atomicAdd(&filled_count, 1u);
+                }
             }
         }
     }
