@@ -27,12 +27,6 @@
 
 const LIST: u32 = 0u;
 const LANES: u32 = 64u;
-// Pixels in a row that an invocation fills: with the network as many as a strip of its convolutions has.
-#ifdef NETWORK
-const STRIP: u32 = CONV_STRIP;
-#else
-const STRIP: u32 = 1u;
-#endif
 
 var<workgroup> filled_count: atomic<u32>;
 
@@ -62,6 +56,15 @@ fn fill(pixel: vec2<u32>, number: u32, words: vec2<u32>) -> bool {
     return mixed.filled;
 }
 
+fn fill_hole(pixel: vec2<u32>, listed: bool, words: vec2<u32>) {
+    let number = frame_number(frame, pixel);
+    if (listed && all(pixel < params.size) && infill_is_hole(number)) {
+        if (fill(pixel, number, words)) {
+            atomicAdd(&filled_count, 1u);
+        }
+    }
+}
+
 @compute @workgroup_size(LANES)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
@@ -79,26 +82,20 @@ fn main(
 #ifdef NETWORK
     decode_tile(corner, lane);
 #endif
-    for (var i = lane; i < INFILL_TILE * INFILL_TILE / STRIP; i += LANES) {
-        let inside = vec2<u32>(STRIP * (i % (INFILL_TILE / STRIP)), i / (INFILL_TILE / STRIP));
 #ifdef NETWORK
+    let strips = conv_strips(INFILL_TILE);
+    for (var i = lane; i < strips * INFILL_TILE; i += LANES) {
+        let inside = vec2<u32>(CONV_STRIP * (i % strips), i / strips);
         var words = decode_strip(inside);
-#endif
-        for (var k = 0u; k < STRIP; k++) {
-            let pixel = corner + inside + vec2<u32>(k, 0u);
-            let number = frame_number(frame, pixel);
-            if (listed && all(pixel < params.size) && infill_is_hole(number)) {
-#ifdef NETWORK
-                let filled = fill(pixel, number, words[k]);
-#else
-                let filled = fill(pixel, number, vec2<u32>(0u));
-#endif
-                if (filled) {
-                    atomicAdd(&filled_count, 1u);
-                }
-            }
+        for (var k = 0u; k < CONV_STRIP; k++) {
+            fill_hole(corner + inside + vec2<u32>(k, 0u), listed, words[k]);
         }
     }
+#else
+    for (var i = lane; i < INFILL_TILE * INFILL_TILE; i += LANES) {
+        fill_hole(corner + vec2<u32>(i % INFILL_TILE, i / INFILL_TILE), listed, vec2<u32>(0u));
+    }
+#endif
     workgroupBarrier();
     if (lane == 0u) {
         atomicAdd(&tiles[TILES_FILLED], atomicLoad(&filled_count));
