@@ -300,6 +300,7 @@ function connect() {
     loadUrl(element("url").value, "");
   };
   connectDrop();
+  window.addEventListener("pointerdown", ({ pointerType }) => document.body.classList.toggle("touched", pointerType === "touch"));
   window.addEventListener("hashchange", () => openLink());
   new ResizeObserver(() => {
     applySettings();

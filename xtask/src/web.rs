@@ -30,7 +30,7 @@ pub(crate) fn run(arguments: &[String]) -> Result<(), String> {
         ["--serve"] => serve_page(PORT),
         ["--serve", port] => serve_page(port.parse().map_err(|_error| format!("no port: {port}"))?),
         ["--test"] => test(&["--test", "test.mjs"], 1),
-        ["--measure"] => test(&["measure.mjs"], 5),
+        ["--measure"] => test(&["measure.mjs"], 3),
         _ => Err("usage: cargo xtask web [--serve [PORT] | --test | --measure]".to_owned()),
     }
 }
@@ -92,7 +92,7 @@ fn optimise(module: &Path) -> Result<(), String> {
     let smaller = module.with_extension("opt");
     let mut command = Command::new("wasm-opt");
     // The features are those that the module names.
-    command.args(["-Os", "--output"]).arg(&smaller).arg(module);
+    command.args(["-O3", "--output"]).arg(&smaller).arg(module);
     match command.output() {
         Ok(output) if output.status.success() => {
             fs::rename(&smaller, module).map_err(|error| format!("{}: {error}", smaller.display()))
