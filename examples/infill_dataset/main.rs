@@ -23,13 +23,12 @@ use sequence::{Sequence, Subject};
 use support::{Failure, Gpu};
 
 /// Kinds of volumes, in turn.
-const KINDS: [&str; 10] = [
+const KINDS: [&str; 9] = [
     "turbulence",
     "mixing-layer",
     "blobs",
     "shells",
     "sheets",
-    "rods",
     "tubes",
     "gyroid",
     "rough-solid",

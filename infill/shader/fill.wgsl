@@ -33,10 +33,10 @@ var<workgroup> filled_count: atomic<u32>;
 fn hints(words: vec2<u32>) -> MixHints {
 #ifdef NETWORK
     let network = decode_head(words);
-    return MixHints(network[0], network[1].xy);
+    return MixHints(network[0], network[1].xy, network[1].z);
 #else
     // Loaded, so that the mixture is computed as with a network of zeros.
-    return MixHints(vec4<f32>(params.none), vec2<f32>(params.none));
+    return MixHints(vec4<f32>(params.none), vec2<f32>(params.none), params.none);
 #endif
 }
 

@@ -2,7 +2,7 @@
 
 use crate::math::{Jet, Real};
 use crate::{
-    Blobs, Gyroid, Labels, MarschnerLobb, MixingLayer, Patch, PlaneRamp, Rods, RoughSolid, Sheets,
+    Blobs, Gyroid, Labels, MarschnerLobb, MixingLayer, Patch, PlaneRamp, RoughSolid, Sheets,
     Shells, SphereDistance, Tubes, Turbulence,
 };
 
@@ -60,7 +60,6 @@ pub const NAMES: &[&str] = &[
     "blobs",
     "sheets",
     "tubes",
-    "rods",
     "labels",
 ];
 
@@ -102,7 +101,6 @@ pub fn by_name_with_seed(
         "blobs" => Box::new(Blobs::with_seed(dims, seed)),
         "sheets" => Box::new(Sheets::with_seed(dims, seed)),
         "tubes" => Box::new(Tubes::with_seed(dims, seed)),
-        "rods" => Box::new(Rods::with_seed(dims, seed)),
         "labels" => Box::new(Labels::with_seed(dims, seed)),
         _ => return Err(UnknownField { name: name.to_owned() }),
     })

@@ -13,6 +13,7 @@ struct Mix {
 struct MixHints {
     logits: vec4<f32>,
     residuals: vec2<f32>, // of coverage and N.V
+    doubt: f32, // the same for every pixel
 }
 
 // Some unit vector perpendicular to a unit vector.
@@ -25,7 +26,7 @@ fn mix_candidates(found: array<Candidate, 4>, hints: MixHints, to_viewer: vec3<f
     var candidates = found;
     var logits = vec4<f32>(PRIOR_NEIGHBOURS, PRIOR_COARSE, PRIOR_COARSE_THIN, PRIOR_HISTORY) + hints.logits;
     let share = candidates[0].coverage;
-    logits.x -= DOUBT * 4.0 * share * (1.0 - share);
+    logits.x -= (DOUBT + hints.doubt) * 4.0 * share * (1.0 - share);
     var most = -3.0e38;
     for (var i = 0u; i < 4u; i++) {
         if (candidates[i].valid) {

@@ -144,10 +144,15 @@ fn perpendicular(v: [f32; 3]) -> [f32; 3] {
     shading::safe_normalize(other, [1.0, 0.0, 0.0])
 }
 
-/// The mixture of a hole's candidates, with what the network says; `None` without any candidate.
-pub fn mix(candidates: &[Packed; 4], output: &[f32], to_viewer: [f32; 3]) -> Option<Filled> {
+/// The mixture of a hole's candidates, with what the network says and what its weights add to [`DOUBT`]; `None` without any candidate.
+pub fn mix(
+    candidates: &[Packed; 4],
+    output: &[f32],
+    doubt: f32,
+    to_viewer: [f32; 3],
+) -> Option<Filled> {
     let share = candidates[0].coverage;
-    let doubt = [DOUBT * 4.0 * share * (1.0 - share), 0.0, 0.0, 0.0];
+    let doubt = [(DOUBT + doubt) * 4.0 * share * (1.0 - share), 0.0, 0.0, 0.0];
     let logit = |i: usize| PRIOR[i] + output[i] - doubt[i];
     let valid = || (0..4).filter(|&i| candidates[i].valid);
     let most = valid().map(logit).reduce(f32::max)?;
@@ -227,7 +232,7 @@ impl Scene<'_> {
             .zip(&packed)
             .map(|(pixel, candidates)| {
                 let output = outputs.texel(pixel[0] as usize, pixel[1] as usize);
-                candidates.as_ref().and_then(|c| mix(c, output, to_viewer(pixel)))
+                candidates.as_ref().and_then(|c| mix(c, output, weights.doubt(), to_viewer(pixel)))
             })
             .collect();
         Fill { pixels, outputs }
