@@ -41,12 +41,17 @@ fn main(
         }
     }
     workgroupBarrier();
-    for (var i = lane; i < INFILL_TILE * INFILL_TILE; i += CONV_LANES) {
-        let inside = vec2<u32>(i % INFILL_TILE, i / INFILL_TILE);
+    let strips = conv_strips(INFILL_TILE);
+    for (var i = lane; i < strips * INFILL_TILE; i += CONV_LANES) {
+        let inside = vec2<u32>(CONV_STRIP * (i % strips), i / strips);
+        let values = conv_outputs(ConvTexels(0u, HALO, GROUPS), inside, FIRST_WEIGHTS, 1u, 0u);
         let texel = corner + inside;
+        // The maps are multiples of 4 texels wide.
         if (listed && all(texel < params.padded)) {
-            let value = conv_output(ConvTexels(0u, HALO, GROUPS), inside, FIRST_WEIGHTS, 1u, 0u);
-            outputs[texel.x + params.padded.x * texel.y] = value;
+            let first = texel.x + params.padded.x * texel.y;
+            for (var k = 0u; k < CONV_STRIP; k++) {
+                outputs[first + k] = values[k];
+            }
         }
     }
 }

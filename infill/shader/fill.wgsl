@@ -30,20 +30,21 @@ const LANES: u32 = 64u;
 
 var<workgroup> filled_count: atomic<u32>;
 
-fn hints(inside: vec2<u32>) -> MixHints {
+fn hints(words: vec2<u32>) -> MixHints {
 #ifdef NETWORK
-    let network = decode_pixel(inside);
-    return MixHints(network[0], network[1].xy);
+    let network = decode_head(words);
+    return MixHints(network[0], network[1].xy, network[1].z);
 #else
     // Loaded, so that the mixture is computed as with a network of zeros.
-    return MixHints(vec4<f32>(params.none), vec2<f32>(params.none));
+    return MixHints(vec4<f32>(params.none), vec2<f32>(params.none), params.none);
 #endif
 }
 
-fn fill(pixel: vec2<u32>, number: u32, inside: vec2<u32>) -> bool {
+// `words`: what the network has for the pixel.
+fn fill(pixel: vec2<u32>, number: u32, words: vec2<u32>) -> bool {
     let ray = frame_ray(frame, pixel).ray;
     let to_viewer = shading_to_viewer(ray.direction);
-    let mixed = mix_candidates(features_candidates(pixel, ray, number), hints(inside), to_viewer);
+    let mixed = mix_candidates(features_candidates(pixel, ray, number), hints(words), to_viewer);
     var color = shading.unfinished;
     if (mixed.filled) {
         let coverage = select(mixed.coverage, step(0.5, mixed.coverage), params.crisp != 0u);
@@ -53,6 +54,15 @@ fn fill(pixel: vec2<u32>, number: u32, inside: vec2<u32>) -> bool {
     // An earlier pass may have filled the pixel with a candidate that has turned out to be wrong.
     textureStore(color_out, pixel, color);
     return mixed.filled;
+}
+
+fn fill_hole(pixel: vec2<u32>, listed: bool, words: vec2<u32>) {
+    let number = frame_number(frame, pixel);
+    if (listed && all(pixel < params.size) && infill_is_hole(number)) {
+        if (fill(pixel, number, words)) {
+            atomicAdd(&filled_count, 1u);
+        }
+    }
 }
 
 @compute @workgroup_size(LANES)
@@ -72,16 +82,20 @@ fn main(
 #ifdef NETWORK
     decode_tile(corner, lane);
 #endif
-    for (var i = lane; i < INFILL_TILE * INFILL_TILE; i += LANES) {
-        let inside = vec2<u32>(i % INFILL_TILE, i / INFILL_TILE);
-        let pixel = corner + inside;
-        let number = frame_number(frame, pixel);
-        if (listed && all(pixel < params.size) && infill_is_hole(number)) {
-            if (fill(pixel, number, inside)) {
-                atomicAdd(&filled_count, 1u);
-            }
+#ifdef NETWORK
+    let strips = conv_strips(INFILL_TILE);
+    for (var i = lane; i < strips * INFILL_TILE; i += LANES) {
+        let inside = vec2<u32>(CONV_STRIP * (i % strips), i / strips);
+        var words = decode_strip(inside);
+        for (var k = 0u; k < CONV_STRIP; k++) {
+            fill_hole(corner + inside + vec2<u32>(k, 0u), listed, words[k]);
         }
     }
+#else
+    for (var i = lane; i < INFILL_TILE * INFILL_TILE; i += LANES) {
+        fill_hole(corner + vec2<u32>(i % INFILL_TILE, i / INFILL_TILE), listed, vec2<u32>(0u));
+    }
+#endif
     workgroupBarrier();
     if (lane == 0u) {
         atomicAdd(&tiles[TILES_FILLED], atomicLoad(&filled_count));

@@ -50,21 +50,33 @@ fn main(
         conv_memory[i] = conv_pack(value);
     }
     workgroupBarrier();
-    for (var i = lane; i < MIDDLE * MIDDLE * GROUPS_OUT; i += CONV_LANES) {
-        let place = vec2<u32>(i / GROUPS_OUT % MIDDLE, i / GROUPS_OUT / MIDDLE);
-        var value = vec2<u32>(0u);
-        if (conv_inside(corner + vec2<i32>(place) - vec2<i32>(1), size)) {
-            value = conv_output(inputs, place, FIRST_WEIGHTS, GROUPS_OUT, i % GROUPS_OUT);
+    let middle_strips = conv_strips(MIDDLE);
+    for (var i = lane; i < middle_strips * MIDDLE * GROUPS_OUT; i += CONV_LANES) {
+        let channels = i % GROUPS_OUT;
+        let strip = i / GROUPS_OUT;
+        let place = vec2<u32>(CONV_STRIP * (strip % middle_strips), strip / middle_strips);
+        let values = conv_outputs(inputs, place, FIRST_WEIGHTS, GROUPS_OUT, channels);
+        for (var k = 0u; k < CONV_STRIP; k++) {
+            let texel = place + vec2<u32>(k, 0u);
+            if (texel.x < MIDDLE) {
+                let inside = conv_inside(corner + vec2<i32>(texel) - vec2<i32>(1), size);
+                conv_memory[middle.first + GROUPS_OUT * (texel.x + MIDDLE * texel.y) + channels] =
+                    select(vec2<u32>(0u), values[k], inside);
+            }
         }
-        conv_memory[middle.first + i] = value;
     }
     workgroupBarrier();
-    for (var i = lane; i < EDGE * EDGE * GROUPS_OUT; i += CONV_LANES) {
-        let place = vec2<u32>(i / GROUPS_OUT % EDGE, i / GROUPS_OUT / EDGE);
-        let texel = vec2<u32>(corner) + place;
-        if (listed && all(texel < size)) {
-            let value = conv_output(middle, place, SECOND_WEIGHTS, GROUPS_OUT, i % GROUPS_OUT);
-            outputs[GROUPS_OUT * (texel.x + size.x * texel.y) + i % GROUPS_OUT] = value;
+    let strips = conv_strips(EDGE);
+    for (var i = lane; i < strips * EDGE * GROUPS_OUT; i += CONV_LANES) {
+        let channels = i % GROUPS_OUT;
+        let strip = i / GROUPS_OUT;
+        let place = vec2<u32>(CONV_STRIP * (strip % strips), strip / strips);
+        let values = conv_outputs(middle, place, SECOND_WEIGHTS, GROUPS_OUT, channels);
+        for (var k = 0u; k < CONV_STRIP; k++) {
+            let texel = vec2<u32>(corner) + place + vec2<u32>(k, 0u);
+            if (listed && all(texel < size)) {
+                outputs[GROUPS_OUT * (texel.x + size.x * texel.y) + channels] = values[k];
+            }
         }
     }
 }

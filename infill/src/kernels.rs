@@ -7,7 +7,7 @@ use gpu_primitives::wgpu;
 use gpu_primitives::wgsl::{Constant, Module, compose_fixed};
 use wavefront::{FrameParams, ShadingParams};
 
-use crate::options::PRIOR;
+use crate::options::{DOUBT, PRIOR};
 use crate::plan::InfillPlan;
 use crate::weights::{LAYERS, Layer, PackedWeights};
 
@@ -221,6 +221,7 @@ pub(crate) fn fill(plan: &InfillPlan, network: bool) -> KernelSource {
         ("PRIOR_COARSE", Constant::F32(PRIOR[1])),
         ("PRIOR_COARSE_THIN", Constant::F32(PRIOR[2])),
         ("PRIOR_HISTORY", Constant::F32(PRIOR[3])),
+        ("DOUBT", Constant::F32(DOUBT)),
     ];
     if plan.sources().history {
         constants.push(("HISTORY", Constant::Bool(true)));

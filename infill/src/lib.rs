@@ -17,7 +17,7 @@ pub mod weights;
 pub use error::Error;
 pub use gpu_primitives::wgpu;
 pub use guide::{Guide, GuideBinds, GuideScene};
-pub use options::{Look, PRIOR, Source, Sources};
+pub use options::{DOUBT, Look, PRIOR, Source, Sources};
 pub use plan::InfillPlan;
 pub use stage::{Infill, InfillBuffers, Method, Scene};
 pub use weights::Weights;

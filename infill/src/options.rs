@@ -40,7 +40,10 @@ pub enum Source {
     History = 3,
 }
 
-/// Logarithms of the weights that candidates have without a network, in the order of [`Source`]: 1 for neighbours and
-/// coarse field, about 1/4 for its thin variant and 3 for history, the best mean of the shares that were tried
-/// on frames of the example `infill_dataset` (`docs/infill.md`).
-pub const PRIOR: [f32; 4] = [0.0, 0.0, -1.4, 1.1];
+/// Logarithms of the weights that candidates have without a network, in the order of [`Source`]; from that of the
+/// neighbours [`DOUBT`] is taken. Both were fitted to the training pictures (`infill/training/fit_prior.py`).
+pub const PRIOR: [f32; 4] = [1.3, 0.0, -4.3, 4.3];
+
+/// How much less neighbours weigh where they disagree: times `4 c (1 - c)`, which is 0 where their mean coverage `c`
+/// is 0 or 1 and 1 where half of them show the surface.
+pub const DOUBT: f32 = 7.0;

@@ -187,21 +187,16 @@ impl Infill {
         let over = |pass: &mut wgpu::ComputePass<'_>, kernel: &Kernel, bind, list: u32| {
             kernel.dispatch_indirect(pass, bind, &buffers.args, 16 * u64::from(list));
         };
-        {
-            let mut pass = begin_pass(encoder, "infill.guess");
-            if let (Some(kernel), Some(bind)) = (&self.push, &buffers.push) {
-                over(&mut pass, kernel, bind, 1);
-            }
-            over(&mut pass, &self.guess, &buffers.guess, 0);
+        if let (Some(kernel), Some(bind)) = (&self.push, &buffers.push) {
+            over(&mut begin_pass(encoder, "infill.push"), kernel, bind, 1);
         }
+        over(&mut begin_pass(encoder, "infill.guess"), &self.guess, &buffers.guess, 0);
         match (method, &self.network, &buffers.network) {
             (Method::Network, Some(kernels), Some(binds)) => {
-                {
-                    let mut pass = begin_pass(encoder, "infill.network");
-                    over(&mut pass, &kernels.encode, &binds.encode, 2);
-                    for (kernel, bind) in kernels.pairs.iter().zip(&binds.pairs) {
-                        over(&mut pass, kernel, bind, 2);
-                    }
+                over(&mut begin_pass(encoder, "infill.encode"), &kernels.encode, &binds.encode, 2);
+                let labels = ["infill.halves", "infill.quarters"];
+                for ((label, kernel), bind) in labels.iter().zip(&kernels.pairs).zip(&binds.pairs) {
+                    over(&mut begin_pass(encoder, label), kernel, bind, 2);
                 }
                 let mut pass = begin_pass(encoder, "infill.fill");
                 over(&mut pass, &kernels.fill, &binds.fill, 0);

@@ -57,6 +57,8 @@ pub struct LayerWeights {
 pub struct Weights {
     /// In the order of [`LAYERS`].
     layers: Vec<LayerWeights>,
+    /// Added to [`crate::DOUBT`].
+    doubt: f16,
 }
 
 impl Weights {
@@ -67,7 +69,7 @@ impl Weights {
             count += LAYERS[i].weights() + LAYERS[i].outputs;
             i += 1;
         }
-        count
+        count + 1
     };
 
     /// The trained weights that come with the crate; `infill/training` says how they were made.
@@ -85,7 +87,7 @@ impl Weights {
         Self::from_fn(|_| 0.0)
     }
 
-    /// From a function of the number's place among all, layer by layer, weight before bias.
+    /// From a function of the number's place among all, layer by layer, weight before bias, the doubt last.
     pub fn from_fn(mut value: impl FnMut(usize) -> f32) -> Self {
         let mut place = 0;
         let mut next = |count: usize| {
@@ -96,10 +98,11 @@ impl Weights {
             .iter()
             .map(|layer| LayerWeights { weight: next(layer.weights()), bias: next(layer.outputs) })
             .collect();
-        Self { layers }
+        let doubt = next(1)[0];
+        Self { layers, doubt }
     }
 
-    /// From a file with the tensors of [`LAYERS`] as f16 or f32.
+    /// From a file with the tensors of [`LAYERS`] and one number, `doubt`, as f16 or f32.
     ///
     /// # Errors
     /// If the file is not a safetensors file, or lacks a tensor of the right shape, or holds numbers beyond f16.
@@ -113,7 +116,14 @@ impl Weights {
                 bias: tensor(&file, format!("{name}.bias"), &[outputs])?,
             })
         });
-        Ok(Self { layers: layers.collect::<Result<_, _>>()? })
+        let layers = layers.collect::<Result<_, _>>()?;
+        let doubt = tensor(&file, "doubt".into(), &[1])?[0];
+        Ok(Self { layers, doubt })
+    }
+
+    /// What is added to [`crate::DOUBT`]: -`DOUBT` for neighbours that weigh the same whether they disagree or not.
+    pub fn doubt(&self) -> f32 {
+        self.doubt.to_f32()
     }
 
     /// Weights of one of [`LAYERS`].
@@ -125,7 +135,7 @@ impl Weights {
 /// Weights as the kernels read them: vectors of four halves.
 ///
 /// Of a 3x3 convolution, for every group of four outputs, tap and group of four inputs, a vector of inputs for each
-/// of the outputs; then the biases. Of the head a vector for each output, then two of biases. Channels that fill up a group are 0.
+/// of the outputs; then the biases. Of the head a vector for each output, then two of biases, the doubt behind them. Other channels that fill up a group are 0.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct PackedWeights {
     pub(crate) vectors: Vec<[f16; 4]>,
@@ -182,6 +192,9 @@ impl PackedWeights {
                 packed.push(std::array::from_fn(bias));
             }
         }
+        if let Some(last) = packed.last_mut() {
+            last[2] = weights.doubt;
+        }
         Self { vectors: packed }
     }
 }
@@ -227,6 +240,7 @@ mod tests {
                 vec![0.5; layer.outputs],
             ));
         }
+        tensors.push(("doubt".into(), vec![1], vec![-2.5]));
         for (name, shape, values) in &mut tensors {
             change(name, shape, values);
         }
@@ -242,7 +256,7 @@ mod tests {
 
     #[test]
     fn the_network_is_as_large_as_the_study_says() {
-        assert_eq!(Weights::COUNT, 5558);
+        assert_eq!(Weights::COUNT, 5558 + 1, "and the doubt");
     }
 
     #[test]
@@ -254,7 +268,8 @@ mod tests {
         assert_eq!(vector, [8.0, 9.0, 10.0, 11.0].map(|input| (2.0 * 16.0 + input) * 9.0 + 5.0));
         let head = PackedWeights::first()[7] as usize;
         assert_eq!(packed.vectors.len(), head + 8);
-        assert_eq!(packed.vectors[head + 7][2..], [f16::ZERO; 2]);
+        let doubt = f16::from_f32((5558 % 2048) as f32);
+        assert_eq!(packed.vectors[head + 7][2..], [doubt, f16::ZERO]);
     }
 
     #[test]
@@ -262,6 +277,7 @@ mod tests {
         let weights = Weights::from_safetensors(&file(|_, _, _| ())).unwrap();
         assert_eq!(weights.layer(0).weight[65].to_f32(), 65.0 / 64.0);
         assert_eq!(weights.layer(7).bias, vec![f16::from_f32(0.5); 6]);
+        assert_eq!(weights.doubt(), -2.5);
     }
 
     #[test]

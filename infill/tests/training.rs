@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a failed set-up fails the test")]
 
-use infill::PRIOR;
+use infill::{DOUBT, PRIOR};
 use wavefront::Shading;
 
 /// What follows `name` and an equals sign on a line of its own in one of the scripts.
@@ -22,6 +22,7 @@ fn numbers(text: &str) -> Vec<f32> {
 #[test]
 fn the_network_starts_from_the_same_shares() {
     assert_eq!(numbers(&value("network.py", "PRIOR")), PRIOR);
+    assert_eq!(numbers(&value("network.py", "DOUBT")), [DOUBT]);
 }
 
 #[test]

@@ -44,10 +44,10 @@ class Mixture:
     def __call__(self, frame):
         frame = data.without(frame, self.left_out)
         if self.network:
-            outputs = self.network(features(frame))
+            outputs, doubt = self.network(features(frame)), self.network.doubt
         else:
-            outputs = torch.zeros(1, OUTPUTS, *frame["c"].shape[1:])
-        coverage, facing = shown(frame, *mix(frame, outputs))
+            outputs, doubt = torch.zeros(1, OUTPUTS, *frame["c"].shape[1:]), 0.0
+        coverage, facing = shown(frame, *mix(frame, outputs, doubt))
         return shading.picture(coverage, facing, shading.PUBLISHED), coverage
 
 

@@ -7,7 +7,9 @@ from torch import nn
 # Candidates in the crate's order: neighbours (push-pull), coarse field, its thin variant, history.
 SOURCES = ["P", "L", "X", "R"]
 # `infill::PRIOR`: logarithms of the candidates' weights without a network.
-PRIOR = [0.0, 0.0, -1.4, 1.1]
+PRIOR = [1.3, 0.0, -4.3, 4.3]
+# `infill::DOUBT`: how much less neighbours that disagree weigh.
+DOUBT = 7.0
 # Voxels at which a soft distance is one half.
 HALF_DISTANCE = 8.0
 FEATURES = 16
@@ -40,11 +42,13 @@ def features(frame):
     return torch.stack(inputs + [distances[s] for s in "LXPR"], dim=1)
 
 
-def mix(frame, outputs):
-    """Coverage and N.V of holes from the candidates and the network's outputs [n, 6, h, w]."""
+def mix(frame, outputs, doubt=0.0, prior=PRIOR):
+    """Coverage and N.V of holes from the candidates, the network's outputs [n, 6, h, w] and what it adds to DOUBT."""
     stacked = lambda name: torch.stack([frame[f"{name}_{s}"] for s in SOURCES], dim=1)
     valid, coverage, facing = stacked("v"), stacked("c"), stacked("nv")
-    logits = outputs[:, :4] + torch.tensor(PRIOR, device=outputs.device).view(1, 4, 1, 1)
+    doubt = (DOUBT + doubt) * 4 * frame["c_P"] * (1 - frame["c_P"])
+    logits = outputs[:, :4] + torch.tensor(prior, device=outputs.device).view(1, 4, 1, 1)
+    logits = torch.cat([logits[:, :1] - doubt.unsqueeze(1), logits[:, 1:]], dim=1)
     # A pixel without any candidate has weights of 0 and so no coverage, as in the crate.
     weights = torch.softmax(logits.masked_fill(valid == 0, -1e9), dim=1) * valid
     covered = weights * coverage
@@ -64,7 +68,7 @@ def shown(frame, coverage, facing):
 
 
 class Network(nn.Module):
-    """A U-Net over three resolutions: 5,558 parameters."""
+    """A U-Net over three resolutions, 5,558 parameters, and what is added to DOUBT."""
 
     def __init__(self):
         super().__init__()
@@ -74,7 +78,7 @@ class Network(nn.Module):
         self.e2a, self.e2b = conv(8, 12), conv(12, 12)
         self.d1, self.d0 = conv(20, 8), conv(12, 4)
         self.head = nn.Conv2d(4, OUTPUTS, 1)
-        # Training starts from the classical filler.
+        self.doubt = nn.Parameter(torch.zeros(1), requires_grad=False)
         nn.init.zeros_(self.head.weight)
         nn.init.zeros_(self.head.bias)
 

@@ -15,7 +15,7 @@ from safetensors.torch import save_file
 import data
 import metrics
 import shading
-from network import Network, features, mix, shown
+from network import DOUBT, Network, PRIOR, features, mix, shown
 
 CROP = 128
 # Places tried per crop; the one is taken with a chance that grows with its holes.
@@ -28,6 +28,9 @@ DROP = {"P": 0.05, "LX": 0.1, "R": 0.25}
 COLORS = [shading.DEFAULT, shading.PUBLISHED]
 LEARNING_RATE = 3e-3
 SSIM_WEIGHT = 0.5
+# Shares from which training starts, without doubt. Started from the classical filler's own, and with thin rods among the
+# pictures, a network became 0.5 dB worse on the held-out frames.
+START = [0.0, 0.0, -1.4, 1.1]
 # Pulls what the residuals push beyond 0..1 back, where clamping has no gradient.
 EXCESS_WEIGHT = 0.1
 
@@ -70,7 +73,7 @@ def drop_sources(frame, rng):
 
 def loss_of(network, frame, colors):
     outputs = network(features(frame).to(memory_format=torch.channels_last))
-    raw = mix(frame, outputs)
+    raw = mix(frame, outputs, -DOUBT, START)
     coverage, facing = shown(frame, *raw)
     picture = shading.picture(coverage, facing, colors)
     truth = shading.picture(frame["truth_c"], frame["truth_nv"], colors)
@@ -94,6 +97,10 @@ def validate(network, batches):
 
 
 def half_precision(network):
+    """The weights, which from now on are added to PRIOR and DOUBT."""
+    with torch.no_grad():
+        network.head.bias[:4] += torch.tensor(START) - torch.tensor(PRIOR)
+        network.doubt.fill_(-DOUBT)
     return {name: value.detach().half().contiguous() for name, value in network.state_dict().items()}
 
 

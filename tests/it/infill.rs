@@ -10,7 +10,7 @@ use macrocell::Grid;
 use progressive_iso::{
     BlockSortedOptions, Camera, Capture, Completeness, Error, Frame, FrameOptions, FrameView,
     Infill, InfillOptions, PassReport, PixelStatus, ProgressiveIsoRenderer, RendererOptions,
-    TraversalStrategy,
+    Residency, TraversalStrategy,
 };
 use wavefront::cpu::frame::{FrameRay, RayStates};
 use wavefront::cpu::shading;
@@ -441,17 +441,31 @@ fn memory_stays_within_the_plan_and_is_nothing_when_off() {
 #[test]
 fn infill_comes_and_goes_with_the_options() {
     let (gpu, scene) = (Gpu::new(), Scene::generated("turbulence", [45, 41, 38], 8.0));
-    let (without, with) = (options(SIZE), with_infill(InfillOptions::default()));
+    // With a cache and pairs, a pass has most to read back.
+    let cached = |options| RendererOptions {
+        strategy: TraversalStrategy::BlockSorted(BlockSortedOptions::default()),
+        residency: Residency::Cached,
+        ..options
+    };
+    let (without, with) = (cached(options(SIZE)), cached(with_infill(InfillOptions::default())));
     let [off, filled] = [Infill::Off, Infill::Classical].map(|i| frame_with(&scene, 20.0, i));
     let mut renderer = gpu.renderer(&scene, without);
     let expected = gpu.finish(&mut renderer, &off);
     for _ in 0..2 {
         renderer.set_options(&gpu.device, with).unwrap();
         renderer.clear_cache();
-        let report = render_until(&gpu, &mut renderer, &filled, 0.5);
+        let report = render_until(&gpu, &mut renderer, &filled, 0.2);
         assert!(report.filled_pixels > 500 && !report.complete(), "{report:?}");
+        let (plan, bytes) = (renderer.plan().clone(), renderer.poll_report().bytes);
         let refused = renderer.set_options(&gpu.device, without);
         assert!(matches!(refused, Err(Error::InfillNotPlanned)), "the frame needs it: {refused:?}");
+        let kept = renderer.poll_report();
+        assert_eq!((renderer.plan(), kept.bytes), (&plan, bytes), "nothing changes");
+        assert_eq!(
+            (kept.frame, kept.newest_frame),
+            (report.frame, report.frame),
+            "the frame goes on"
+        );
         assert_eq!(gpu.finish(&mut renderer, &off).color, expected.color);
         renderer.set_options(&gpu.device, without).unwrap();
         assert!(matches!(renderer.set_frame(&filled), Err(Error::InfillNotPlanned)));

@@ -14,7 +14,7 @@ use progressive_iso::{Capture, Outputs, PixelStatus, RendererOptions, wgpu};
 use serde_json::{Value, json};
 use volume_io::{FixedRateHeader, Geometry};
 use web::link::Link;
-use web::session::Session;
+use web::session::{Session, Settings};
 
 const SCENES: &str = include_str!("../tests/scenes.json");
 /// Budgets in MiB that the measurements are made with: all resident, and a cache.
@@ -73,11 +73,12 @@ fn render(
     let budget_bytes = budget << 20;
     let options =
         RendererOptions { size, outputs, capture: true, budget_bytes, ..Default::default() };
+    let settings = Settings { renderer: options, ..Settings::default() };
     let volume = volumes::brain();
     let header = FixedRateHeader::parse(&volume.bytes).ok_or("the bundled file has no header")?;
     let began = Instant::now();
     let geometry = Geometry::default();
-    let mut session = Session::new(&gpu.device, &gpu.queue, header, geometry, options)?;
+    let mut session = Session::new(&gpu.device, &gpu.queue, header, geometry, settings)?;
     session.push(&volume.bytes)?;
     session.finish()?;
     let mut first_ms = None;

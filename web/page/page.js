@@ -2,7 +2,7 @@
 //
 // `?present=copy` reads finished pictures back and draws them, for browsers that compute but cannot present.
 
-import init, { Viewer, headerBytes, isFixedRate, linkedVolume } from "./web.js";
+import init, { Viewer, headerBytes, isFixedRate, linkedInfill, linkedVolume } from "./web.js";
 import { control } from "./controls.js";
 import { converted, fromFile, fromUrl, pieces } from "./source.js";
 
@@ -13,6 +13,7 @@ const MOST_WAITING = 4 << 20;
 /** Bytes that are copied to the module's memory at a time. */
 const MOST_PUSHED = 1 << 20;
 const MOST_PIXELS_PER_AXIS = 4096;
+const SETTINGS = ["scale", "budget", "threshold", "strategy", "infill"];
 
 const element = (id) => document.getElementById(id);
 const copies = new URLSearchParams(location.search).get("present") === "copy";
@@ -24,6 +25,8 @@ let loading = null;
 let running = false;
 let shownAt = null;
 let captured = null;
+/** The controls' values that the viewer has accepted last. */
+let inForce = null;
 
 // ---------------------------------------------------------------- messages
 
@@ -58,12 +61,20 @@ function step() {
     takeCopy();
     takeCapture();
     const refusal = viewer.takeRefusal();
-    if (refusal) say(`These settings are not possible: ${refusal}. The last ones stay.`);
+    if (refusal) refuse(refusal);
+    else if (viewer.areSettingsApplied()) inForce = SETTINGS.map((id) => element(id).value);
     showRows(busy);
     if (busy) wake();
   } catch (error) {
     stop(reason(error));
   }
+}
+
+/** Settings that are not possible: the controls go back to those in force. */
+function refuse(reason) {
+  SETTINGS.forEach((id, i) => inForce && (element(id).value = inForce[i]));
+  describeSettings();
+  say(`These settings are not possible: ${reason}. The last ones stay.`);
 }
 
 /** After a fault of the device nothing works any more. */
@@ -120,27 +131,26 @@ function showRows(busy) {
   while (list.children.length > rows.length) list.lastChild.remove();
   element("completeness").textContent = rows[1] ?? "0 %";
   element("meter").value = completeness;
-  const loaded = viewer.loaded();
-  element("state").textContent = !rows.length ? "no volume" : loaded < 1 ? "loading" : busy ? "rendering" : "finished";
-  if (loading === null && rows.length) sayLoading(loaded < 1 ? "To the GPU" : null, loaded);
+  element("state").textContent = loading ? "loading" : !rows.length ? "no volume" : busy ? "rendering" : "finished";
 }
 
 // ---------------------------------------------------------------- volumes
 
-/** Ends what is loading, and with it a volume that is there in part. */
+/** Ends what is loading. */
 function giveUp() {
   loading?.abort();
-  if (loading?.opened) viewer.close();
+  viewer?.giveUp();
   loading = null;
 }
 
-/** Replaces the volume; a fault before the new one has begun leaves the old one. */
+/** Replaces the volume, when the new one has its first picture; any fault before leaves the old one. */
 async function load(open, newAddress, fragment) {
   giveUp();
   const job = new AbortController();
   loading = job;
   say(null);
   sayLoading("Opening");
+  wake();
   try {
     const source = await open(job.signal);
     const incoming = pieces(source.bytes, headerBytes());
@@ -158,7 +168,6 @@ async function load(open, newAddress, fragment) {
       if (!job.opened) {
         viewer.open(piece.subarray(0, headerBytes()), new Float64Array(geometry));
         viewer.restore(fragment);
-        address = newAddress;
         job.opened = true;
         wake();
       }
@@ -166,7 +175,14 @@ async function load(open, newAddress, fragment) {
     }
     if (!job.opened) throw new Error(`${source.name} is empty`);
     viewer.finish();
+    while (viewer.isOpening()) {
+      sayLoading("To the GPU", viewer.loaded());
+      await new Promise(requestAnimationFrame);
+      if (job.signal.aborted) return;
+    }
     loading = null;
+    sayLoading(null);
+    address = newAddress;
     element("name").textContent = about ? `${source.name}: ${about}` : source.name;
     begin();
   } catch (error) {
@@ -274,7 +290,7 @@ function connect() {
       wake();
     });
   }
-  for (const id of ["scale", "budget", "threshold", "strategy"]) element(id).addEventListener("input", applySettings);
+  for (const id of SETTINGS) element(id).addEventListener("input", applySettings);
   element("save").onclick = save;
   element("share").onclick = share;
   element("message").querySelector("button").onclick = () => say(null);
@@ -284,6 +300,7 @@ function connect() {
     loadUrl(element("url").value, "");
   };
   connectDrop();
+  window.addEventListener("pointerdown", ({ pointerType }) => document.body.classList.toggle("touched", pointerType === "touch"));
   window.addEventListener("hashchange", () => openLink());
   new ResizeObserver(() => {
     applySettings();
@@ -313,6 +330,11 @@ const loadFile = (file) => load(async () => fromFile(file), null, "");
 const loadUrl = (url, fragment) => load((signal) => fromUrl(url, signal), url, fragment);
 
 function openLink() {
+  const infill = linkedInfill(location.hash);
+  if (infill) {
+    element("infill").value = infill;
+    applySettings();
+  }
   const volume = linkedVolume(location.hash) ?? BUNDLED;
   if (volume === address) {
     viewer.restore(location.hash);
@@ -324,16 +346,21 @@ function openLink() {
   loadUrl(volume, volume === BUNDLED && !location.hash.includes("iso=") ? `iso=${BUNDLED_ISOVALUE}&${location.hash.slice(1)}` : location.hash);
 }
 
+const mebibytes = () => Math.round(2 ** element("budget").valueAsNumber);
+
+function describeSettings() {
+  const percent = (id) => `${Math.round(element(id).valueAsNumber * 100)} %`;
+  const texts = [percent("scale"), `${mebibytes()} MiB`, percent("threshold")];
+  document.querySelectorAll(".setting output").forEach((output, i) => (output.textContent = texts[i]));
+}
+
 function applySettings() {
-  const [scale, budget, threshold] = ["scale", "budget", "threshold"].map((id) => element(id).valueAsNumber);
-  const mebibytes = Math.round(2 ** budget);
+  const [scale, threshold] = ["scale", "threshold"].map((id) => element(id).valueAsNumber);
   const pixels = (n) => Math.min(Math.max(Math.round(n * devicePixelRatio * scale), 1), MOST_PIXELS_PER_AXIS);
   const stage = element("stage");
-  const outputs = document.querySelectorAll(".setting output");
-  outputs[0].textContent = `${Math.round(scale * 100)} %`;
-  outputs[1].textContent = `${mebibytes} MiB`;
-  outputs[2].textContent = `${Math.round(threshold * 100)} %`;
-  viewer?.set(pixels(stage.clientWidth), pixels(stage.clientHeight), mebibytes, threshold, element("strategy").value === "sorted");
+  describeSettings();
+  viewer?.set(pixels(stage.clientWidth), pixels(stage.clientHeight), mebibytes(), threshold,
+    element("strategy").value === "sorted", element("infill").value);
   wake();
 }
 

@@ -6,6 +6,7 @@ pub mod bars;
 #[cfg(target_arch = "wasm32")]
 pub mod browser;
 pub mod camera;
+pub mod exchange;
 pub mod link;
 pub mod rows;
 pub mod session;

@@ -1,5 +1,7 @@
 //! The part of the page's address behind `#`: which volume, which isovalue, which view.
 
+use progressive_iso::Infill;
+
 use crate::camera::Orbit;
 
 /// What a link restores. What is left out is the page's choice.
@@ -11,6 +13,24 @@ pub struct Link {
     pub isovalue: Option<f32>,
     /// The camera.
     pub view: Option<Orbit>,
+    /// What unfinished pixels show.
+    pub infill: Option<Infill>,
+}
+
+/// The names of the kinds of in-fill, in links and on the page.
+const INFILLS: [(&str, Infill); 3] =
+    [("off", Infill::Off), ("classical", Infill::Classical), ("network", Infill::Network)];
+
+/// The kind of in-fill with this name.
+#[must_use]
+pub fn infill_named(name: &str) -> Option<Infill> {
+    INFILLS.into_iter().find(|&(known, _)| known == name).map(|(_, infill)| infill)
+}
+
+/// The name of a kind of in-fill.
+#[must_use]
+pub fn infill_name(infill: Infill) -> &'static str {
+    INFILLS.into_iter().find(|&(_, known)| known == infill).map_or("off", |(name, _)| name)
 }
 
 impl Link {
@@ -25,6 +45,7 @@ impl Link {
                     link.isovalue = text.parse().ok().filter(|v: &f32| v.is_finite());
                 }
                 Some(("view", text)) => link.view = view(text),
+                Some(("infill", text)) => link.infill = infill_named(text),
                 _ => {}
             }
         }
@@ -41,6 +62,7 @@ impl Link {
             let Orbit { azimuth, elevation, distance, target: [x, y, z] } = view;
             format!("view={azimuth},{elevation},{distance},{x},{y},{z}")
         }));
+        parts.extend(self.infill.map(|infill| format!("infill={}", infill_name(infill))));
         parts.join("&")
     }
 }
@@ -91,6 +113,7 @@ mod tests {
             volume: Some("https://example.org/a b/\u{fc}.nii.gz?x=1&y=2#z".into()),
             isovalue: Some(0.1),
             view: Some(Orbit { azimuth: -12.3456, ..Orbit::default().moved(0.1, -0.2) }),
+            infill: Some(Infill::Classical),
         }
     }
 
@@ -101,12 +124,14 @@ mod tests {
             Link::default(),
             Link { volume: None, ..link() },
             Link { isovalue: Some(-1e-20), view: None, ..link() },
+            Link { infill: Some(Infill::Off), ..link() },
+            Link { infill: Some(Infill::Network), ..Link::default() },
         ] {
             assert_eq!(Link::parse(&link.format()), link, "{}", link.format());
             assert_eq!(Link::parse(&format!("#{}", link.format())), link);
         }
         assert!(!link().format()[7..].contains('#'));
-        assert_eq!(link().format().matches('&').count(), 2);
+        assert_eq!(link().format().matches('&').count(), 3);
     }
 
     #[test]
@@ -137,6 +162,7 @@ mod tests {
             "volume=%f",
             "volume=%zz",
             "volume=%ff",
+            "infill=all",
             "other=3&=&&",
         ] {
             assert_eq!(Link::parse(text), Link::default(), "{text}");

@@ -1,6 +1,6 @@
 //! The page's read-outs: names and values, in order.
 
-use progressive_iso::{Residency, TraversalStrategy};
+use progressive_iso::{Infill, Residency, TraversalStrategy};
 
 use crate::session::Session;
 use crate::text;
@@ -10,7 +10,7 @@ use crate::text;
 pub fn rows(session: &Session) -> Vec<(&'static str, String)> {
     let (report, renderer) = (session.report(), session.renderer());
     let (plan, dims) = (renderer.plan(), renderer.volume().dims());
-    let [width, height] = session.options().size;
+    let [width, height] = session.settings().renderer.size;
     let kept = match plan.residency() {
         Residency::Full => "all decoded at load".to_owned(),
         _ => format!("{} of {} cached", text::count(plan.slots()), text::count(plan.blocks())),
@@ -19,7 +19,7 @@ pub fn rows(session: &Session) -> Vec<(&'static str, String)> {
         Residency::Full => text::count(plan.blocks()),
         _ => text::count(report.blocks_decoded.into()),
     };
-    let strategy = match session.options().strategy {
+    let strategy = match session.settings().renderer.strategy {
         TraversalStrategy::RunAhead => "run ahead",
         _ => "block sorted",
     };
@@ -29,6 +29,9 @@ pub fn rows(session: &Session) -> Vec<(&'static str, String)> {
         ("passes", text::count(report.pass.into())),
         ("time", last.map_or_else(|| "–".to_owned(), |pass| text::milliseconds(pass.ms))),
         ("last pass", pass_time(report)),
+        ("exact pixels", text::count(report.exact_pixels().into())),
+        ("filled pixels", text::count(report.filled_pixels.into())),
+        ("in-fill", infill(session).to_owned()),
         ("blocks decoded", decoded),
         ("blocks kept", kept),
         ("strategy", strategy.to_owned()),
@@ -40,6 +43,17 @@ pub fn rows(session: &Session) -> Vec<(&'static str, String)> {
     let sums = text::by_purpose(&renderer.bytes_by_category());
     rows.extend(sums.into_iter().map(|(purpose, sum)| (purpose, text::bytes(sum))));
     rows
+}
+
+/// What unfinished pixels show, or why not what was asked for.
+fn infill(session: &Session) -> &'static str {
+    match (session.infill(), session.settings().infill, session.renderer().plan().residency()) {
+        (Infill::Classical, ..) => "classical",
+        (Infill::Network, ..) => "network",
+        (_, Infill::Off, _) => "off",
+        (.., Residency::Full) => "nothing to fill",
+        _ => "no memory for it",
+    }
 }
 
 fn pass_time(report: &progressive_iso::PassReport) -> String {

@@ -1,8 +1,9 @@
 //! A volume on its way from file to finished pictures, one step per call.
 
 use progressive_iso::{
-    CompressedVolume, Frame, FrameOptions, PassReport, ProgressiveIsoRenderer, RendererOptions,
-    Shading, StreamFeed, wgpu,
+    Completeness, CompressedVolume, Frame, FrameOptions, Infill, InfillOptions, InfillWeights,
+    PassReport, ProgressiveIsoRenderer, RendererOptions, Residency, ScenePlan, Shading, StreamFeed,
+    wgpu,
 };
 use volume_io::{FixedRateHeader, Geometry, Histogram, StreamScan};
 use web_time::Instant;
@@ -22,6 +23,9 @@ pub const BACKGROUND: [f32; 4] = [0.96, 0.965, 0.97, 1.0];
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
+    /// A file that starts with something else.
+    #[error("no fixed-rate zfp stream of 3D floats")]
+    NoFixedRate,
     /// The file.
     #[error(transparent)]
     File(#[from] volume_io::Error),
@@ -48,6 +52,38 @@ pub struct Step {
     pub rests: bool,
 }
 
+/// What a session may be asked for at any time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// What the renderer is made with; the session plans its in-fill.
+    pub renderer: RendererOptions,
+    /// What unfinished pixels show. Nothing is planned for it where the whole volume is resident, which
+    /// leaves next to nothing to fill, or where the budget has no room for it.
+    pub infill: Infill,
+    /// Share of the rays that enter the volume with which a frame is complete enough, 0 to 1.
+    pub threshold: f64,
+}
+
+impl Default for Settings {
+    /// The renderer's defaults; holes are filled by the network until pictures are finished.
+    fn default() -> Self {
+        Self { renderer: RendererOptions::default(), infill: Infill::Network, threshold: 1.0 }
+    }
+}
+
+impl Settings {
+    /// The renderer's options, with what in-fill needs.
+    fn planned(&self, volume: &CompressedVolume, limits: &wgpu::Limits) -> RendererOptions {
+        let plan = |options| ScenePlan::new(volume, &options, limits);
+        let network = (self.infill == Infill::Network).then(InfillWeights::trained);
+        let infill = Some(InfillOptions { network, ..InfillOptions::default() });
+        let filled = RendererOptions { infill, ..self.renderer };
+        let is_cached = plan(self.renderer).is_ok_and(|p| p.residency() == Residency::Cached);
+        let is_filled = self.infill != Infill::Off && is_cached && plan(filled).is_ok();
+        if is_filled { filled } else { RendererOptions { infill: None, ..self.renderer } }
+    }
+}
+
 /// One volume, its view and its renderer.
 #[derive(Debug)]
 pub struct Session {
@@ -56,13 +92,14 @@ pub struct Session {
     feed: Option<StreamFeed>,
     scan: StreamScan,
     histogram: Option<Histogram>,
+    /// In force, with what is planned for in-fill.
     options: RendererOptions,
-    wanted: RendererOptions,
+    settings: Settings,
+    wanted: Settings,
     refused: Option<progressive_iso::Error>,
     view: Orbit,
     /// None until it is chosen or the histogram suggests one.
     isovalue: Option<f32>,
-    threshold: f64,
     /// Whether view or isovalue are newer than the renderer's frame.
     is_changed: bool,
     began: Instant,
@@ -82,11 +119,12 @@ impl Session {
         queue: &wgpu::Queue,
         header: FixedRateHeader,
         geometry: Geometry,
-        options: RendererOptions,
+        settings: Settings,
     ) -> Result<Self, Error> {
         let FixedRateHeader { dims, bits_per_block, first_bit, .. } = header;
         let (mut volume, feed) = CompressedVolume::streamed(dims, bits_per_block, first_bit)?;
         volume.world_from_index = CompressedVolume::placed(geometry.spacing, geometry.origin);
+        let options = settings.planned(&volume, &device.limits());
         let renderer = ProgressiveIsoRenderer::new(device, queue, volume, options)?;
         let mut session = Self {
             renderer,
@@ -94,11 +132,11 @@ impl Session {
             scan: StreamScan::new(header, SAMPLES),
             histogram: None,
             options,
-            wanted: options,
+            settings,
+            wanted: settings,
             refused: None,
             view: Orbit::default(),
             isovalue: None,
-            threshold: 1.0,
             is_changed: true,
             began: Instant::now(),
             passes: Vec::new(),
@@ -151,8 +189,8 @@ impl Session {
     pub fn advance(&mut self, device: &wgpu::Device, queue: &wgpu::Queue) -> Result<Step, Error> {
         self.take_report();
         let report = self.report;
-        if self.wanted != self.options && report.loaded >= 1.0 {
-            self.apply_options(device)?;
+        if self.wanted != self.settings && report.loaded >= 1.0 {
+            self.apply(device)?;
         }
         // A frame that shows nothing yet is not given up, or a moving camera would show nothing at all.
         if self.is_changed && (shows_newest(&report) || report.loaded < 1.0) {
@@ -163,7 +201,7 @@ impl Session {
             self.take_report();
         }
         let report = self.report;
-        let rests = self.is_complete_enough() && !self.is_changed && self.wanted == self.options;
+        let rests = self.is_complete_enough() && !self.is_changed && self.wanted == self.settings;
         let now = (report.frame, report.pass, rests);
         let is_new = shows_newest(&report) && now != self.last;
         self.last = now;
@@ -171,13 +209,19 @@ impl Session {
     }
 
     fn set_frame(&mut self) -> Result<(), progressive_iso::Error> {
+        self.set_frame_filled(self.infill())
+    }
+
+    fn set_frame_filled(&mut self, infill: Infill) -> Result<(), progressive_iso::Error> {
+        let threshold = self.settings.threshold;
+        let stop_at = (threshold < 1.0).then_some(Completeness(threshold as f32));
         let ball = self.renderer.volume().bounding_ball();
         let shading =
             Shading { background: BACKGROUND, unfinished: UNFINISHED, ..Shading::default() };
         self.renderer.set_frame(&Frame {
             camera: self.view.camera(ball, self.options.size),
             isovalues: vec![self.isovalue.unwrap_or(0.0)],
-            options: FrameOptions { shading, ..FrameOptions::default() },
+            options: FrameOptions { shading, infill, stop_at, ..FrameOptions::default() },
         })?;
         self.report = self.renderer.poll_report();
         self.is_changed = false;
@@ -196,25 +240,47 @@ impl Session {
         }
     }
 
-    /// Applies the options that were asked for; those that are refused are forgotten.
-    fn apply_options(&mut self, device: &wgpu::Device) -> Result<(), Error> {
-        match self.renderer.set_options(device, self.wanted) {
-            Ok(()) => {
-                self.options = self.wanted;
-                Ok(self.set_frame()?)
+    /// Applies the settings that were asked for; those that are refused are forgotten.
+    fn apply(&mut self, device: &wgpu::Device) -> Result<(), Error> {
+        let mut wanted = self.wanted;
+        if self.renderer.plan().residency() == Residency::Cached {
+            // As the renderer does.
+            wanted.renderer.residency = Residency::Cached;
+        }
+        let planned = wanted.planned(self.renderer.volume(), &device.limits());
+        let options = RendererOptions { residency: self.wanted.renderer.residency, ..planned };
+        if options != self.options {
+            if self.infill() != Infill::Off {
+                // The frame must not ask for more than the new options have.
+                self.set_frame_filled(Infill::Off)?;
             }
-            Err(error) => {
-                self.wanted = self.options;
+            if let Err(error) = self.renderer.set_options(device, options) {
+                self.wanted = self.settings;
                 self.refused = Some(error);
-                Ok(())
+                return Ok(self.set_frame()?);
             }
         }
+        self.options = options;
+        self.settings = self.wanted;
+        Ok(self.set_frame()?)
+    }
+
+    /// What unfinished pixels show: what was asked for, as far as it is planned.
+    #[must_use]
+    pub fn infill(&self) -> Infill {
+        if self.options.infill.is_some() { self.settings.infill } else { Infill::Off }
+    }
+
+    /// Whether the newest picture shows no unfinished pixel as such: all are filled or finished.
+    #[must_use]
+    pub fn is_filled(&self) -> bool {
+        let is_due = self.settings.threshold >= 1.0 || self.report.stopped();
+        self.report.complete() || (self.infill() != Infill::Off && is_due)
     }
 
     /// Whether the newest frame is as complete as it should be.
     fn is_complete_enough(&self) -> bool {
-        let report = &self.report;
-        shows_newest(report) && (report.complete() || report.completeness() >= self.threshold)
+        shows_newest(&self.report) && (self.report.complete() || self.report.stopped())
     }
 
     /// The view.
@@ -243,23 +309,18 @@ impl Session {
         }
     }
 
-    /// Share of the rays that enter the volume with which a frame is complete enough, 0 to 1.
-    pub fn set_threshold(&mut self, threshold: f64) {
-        self.threshold = threshold;
+    /// Asks for other settings, which a later step applies, as soon as the volume is loaded.
+    pub fn set(&mut self, settings: Settings) {
+        self.wanted = settings;
     }
 
-    /// Choices that a later step applies, as soon as the volume is loaded.
-    pub fn set_options(&mut self, options: RendererOptions) {
-        self.wanted = options;
-    }
-
-    /// The choices in force.
+    /// The settings in force.
     #[must_use]
-    pub fn options(&self) -> &RendererOptions {
-        &self.options
+    pub fn settings(&self) -> &Settings {
+        &self.settings
     }
 
-    /// Why choices were refused since the last call; what was in force still is.
+    /// Why settings were refused since the last call; what was in force still is.
     pub fn take_refusal(&mut self) -> Option<progressive_iso::Error> {
         self.refused.take()
     }
@@ -280,6 +341,12 @@ impl Session {
     #[must_use]
     pub fn report(&self) -> &PassReport {
         &self.report
+    }
+
+    /// Whether the pictures hold something of the newest frame.
+    #[must_use]
+    pub fn has_picture(&self) -> bool {
+        shows_newest(&self.report)
     }
 
     /// The renderer, for showing and reading its pictures.

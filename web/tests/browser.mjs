@@ -12,15 +12,22 @@ const PATIENCE = 120_000;
 export const repository = new URL("../../", import.meta.url);
 export const reference = (name) => readFileSync(join(process.env.REFERENCE, name));
 
-export function launch() {
-  return chromium.launch({
+const launchWith = (options, ...args) =>
+  chromium.launch({
     executablePath: process.env.CHROMIUM,
-    args: ["--no-sandbox", "--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader"],
+    args: ["--no-sandbox", "--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader", ...args],
+    ...options,
   });
-}
 
-/** A page that has loaded, and what it complains about. */
-export async function open(browser, hash = "", options = {}, script) {
+export const launch = () => launchWith({});
+
+/** With a window on an X server: everything is composited on SwiftShader, canvases of WebGPU included. */
+export const launchOnScreen = (display) =>
+  launchWith({ headless: false, env: { ...process.env, DISPLAY: display } }, "--enable-features=Vulkan",
+    "--use-vulkan=swiftshader", "--use-angle=vulkan", "--disable-vulkan-surface", "--ignore-gpu-blocklist");
+
+/** A page that has loaded, and what it complains about. `query`: how pictures are shown. */
+export async function open(browser, hash = "", options = {}, script, query = "?present=copy") {
   const context = await browser.newContext({ viewport, ...options });
   const page = await context.newPage();
   if (script) await page.addInitScript(script);
@@ -31,7 +38,7 @@ export async function open(browser, hash = "", options = {}, script) {
   });
   page.on("pageerror", (error) => complaints.push(String(error)));
   // Presenting loses the device in Chromium without a screen.
-  await page.goto(`${process.env.PAGE}?present=copy${hash && "#"}${hash}`);
+  await page.goto(`${process.env.PAGE}${query}${hash && "#"}${hash}`);
   return { page, complaints, context };
 }
 

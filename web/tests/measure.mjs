@@ -2,7 +2,7 @@
 
 import { finished, goTo, launch, loaded, open, reference, scenes, size } from "./browser.mjs";
 
-const RUNS = 5;
+const RUNS = 3;
 /** Of `examples/reference.rs`: as many runs for every budget. */
 const native = JSON.parse(reference("measured.json"));
 const budgets = [...new Set(native.map(({ budget }) => budget))];

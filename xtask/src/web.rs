@@ -1,9 +1,9 @@
 //! The web page: building, serving and testing it.
 
 use std::fs;
-use std::io::Write as _;
+use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Child, Command, Stdio};
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
@@ -30,7 +30,7 @@ pub(crate) fn run(arguments: &[String]) -> Result<(), String> {
         ["--serve"] => serve_page(PORT),
         ["--serve", port] => serve_page(port.parse().map_err(|_error| format!("no port: {port}"))?),
         ["--test"] => test(&["--test", "test.mjs"], 1),
-        ["--measure"] => test(&["measure.mjs"], 5),
+        ["--measure"] => test(&["measure.mjs"], 3),
         _ => Err("usage: cargo xtask web [--serve [PORT] | --test | --measure]".to_owned()),
     }
 }
@@ -87,15 +87,27 @@ fn bind(module: &Path, dist: &Path) -> Result<(), String> {
     web.generate(dist).map_err(|error| format!("wasm-bindgen: {error:#}"))
 }
 
-/// Makes the module smaller where Binaryen is there.
+/// Makes the module smaller where Binaryen is there and new enough to read it: Debian 12's is not.
 fn optimise(module: &Path) -> Result<(), String> {
-    if !process::succeeds("wasm-opt", &["--version"]) {
-        println!("web: wasm-opt not found, the module stays as the compiler made it");
-        return Ok(());
-    }
+    let smaller = module.with_extension("opt");
     let mut command = Command::new("wasm-opt");
-    command.args(["--all-features", "-O2", "--output"]);
-    process::run(command.arg(module).arg(module))
+    // The features are those that the module names.
+    command.args(["-O3", "--output"]).arg(&smaller).arg(module);
+    match command.output() {
+        Ok(output) if output.status.success() => {
+            fs::rename(&smaller, module).map_err(|error| format!("{}: {error}", smaller.display()))
+        }
+        Ok(output) => {
+            let why = String::from_utf8_lossy(&output.stderr);
+            let why = why.lines().next().unwrap_or("no reason given").to_owned();
+            println!("web: wasm-opt cannot read the module ({why}), which stays as it was made");
+            Ok(())
+        }
+        Err(_) => {
+            println!("web: wasm-opt not found, the module stays as the compiler made it");
+            Ok(())
+        }
+    }
 }
 
 /// Bytes of a file after gzip.
@@ -151,14 +163,60 @@ fn test(script: &[&str], runs: u32) -> Result<(), String> {
     let server = serve::Server::bind(&dist, 0)?;
     let url = format!("http://localhost:{}/", server.port());
     std::thread::spawn(move || server.run());
+    let screen = Screen::start()?;
     let mut node = Command::new("node");
     node.args(script).current_dir(&tests);
+    if let Some(screen) = &screen {
+        node.env("SCREEN", &screen.display);
+    }
     process::run(node.envs([
         ("PAGE", url.into()),
         ("CHROMIUM", browser.into_os_string()),
         ("REFERENCE", reference.into_os_string()),
         ("OUTPUT", root.join("target/web-tests").into_os_string()),
     ]))
+}
+
+/// An X server without a monitor, which canvases of WebGPU are presented on.
+struct Screen {
+    server: Child,
+    /// `:` and its number.
+    display: String,
+}
+
+impl Screen {
+    /// None where Xvfb is missing and cannot be installed.
+    fn start() -> Result<Option<Self>, String> {
+        // It answers an unknown option with a failure, but only where it is there.
+        let is_there = || Command::new("Xvfb").arg("-version").output().is_ok();
+        if !is_there() {
+            packages::install(&["xvfb"])?;
+        }
+        if !is_there() {
+            println!("web: Xvfb not found, nothing is presented on a screen");
+            return Ok(None);
+        }
+        let failed = |error: std::io::Error| format!("Xvfb: {error}");
+        let mut command = Command::new("Xvfb");
+        command.args(["-displayfd", "1", "-screen", "0", "1280x1024x24", "-nolisten", "tcp"]);
+        command.stdout(Stdio::piped()).stderr(Stdio::null());
+        let mut screen = Self { server: command.spawn().map_err(failed)?, display: ":".into() };
+        let output = screen.server.stdout.take().ok_or("Xvfb: no output")?;
+        BufReader::new(output).read_line(&mut screen.display).map_err(failed)?;
+        screen.display.truncate(screen.display.trim_end().len());
+        if screen.display == ":" {
+            return Err("Xvfb did not start".to_owned());
+        }
+        Ok(Some(screen))
+    }
+}
+
+impl Drop for Screen {
+    fn drop(&mut self) {
+        // It may have ended already.
+        drop(self.server.kill());
+        drop(self.server.wait());
+    }
 }
 
 /// Chromium's program, after installing what is missing where that is possible.

@@ -92,6 +92,23 @@ fn records_of_another_size_leave_those_in_flight_alone() {
 }
 
 #[test]
+fn buffers_of_another_size_are_not_used_again() {
+    let (device, queue) = &own_device();
+    let ledger = Ledger::new();
+    let mut ring = ReadbackRing::new(&ledger, "test", 4, 1);
+    let source = words(device, &[1, 2, 3]);
+    for size in [4, 12, 8] {
+        ring.set_bytes(size);
+        let mut encoder = encoder(device);
+        assert!(ring.record(device, &mut encoder, &[(&source, 0, size)], size));
+        gpu::submit_and_wait(device, queue, encoder);
+        let all = bytes(&[1, 2, 3]);
+        assert_eq!(ring.take(), Some((size, Ok(all[..size as usize].to_vec()))));
+        assert_eq!(ledger.total(), size + 4 + 8, "one staging buffer, which waits, and the stamps");
+    }
+}
+
+#[test]
 fn a_dropped_encoder_loses_only_its_record() {
     let (device, queue) = &own_device();
     let ledger = Ledger::new();

@@ -29,31 +29,78 @@ fn conv_inside(texel: vec2<i32>, map_size: vec2<u32>) -> bool {
     return all(texel >= vec2<i32>(0)) && all(texel < vec2<i32>(map_size));
 }
 
-// A layer's four outputs for the 3x3 texels from `place` on, before the activation. Its weights: for every group of
-// outputs, tap and group of inputs a vector of inputs for each of the outputs; behind all the biases.
-fn conv_sums(texels: ConvTexels, place: vec2<u32>, layer: u32, outputs: u32, group: u32) -> vec4<f32> {
-    var sum = conv_weight(layer + 36u * texels.groups * outputs + group);
-    var weight = layer + 36u * texels.groups * group;
-    for (var tap = 0u; tap < 9u; tap++) {
-        let at = place + vec2<u32>(tap % 3u, tap / 3u);
-        let first = texels.first + (at.x + texels.width * at.y) * texels.groups;
-        for (var i = 0u; i < texels.groups; i++) {
-            let value = conv_unpack(conv_memory[first + i]);
-            sum += vec4<f32>(
-                dot(conv_weight(weight), value),
-                dot(conv_weight(weight + 1u), value),
-                dot(conv_weight(weight + 2u), value),
-                dot(conv_weight(weight + 3u), value),
-            );
-            weight += 4u;
+// Texels in a row that an invocation makes together: each weight is unpacked once for all of them.
+const CONV_STRIP: u32 = 4u;
+
+// Strips of a row of `width` texels; the last one may reach beyond its end.
+fn conv_strips(width: u32) -> u32 {
+    return (width + CONV_STRIP - 1u) / CONV_STRIP;
+}
+
+fn conv_value(index: u32) -> vec4<f32> {
+    return conv_unpack(conv_memory[min(index, CONV_MEMORY - 1u)]);
+}
+
+fn conv_column(w: mat4x4<f32>, value: vec4<f32>) -> vec4<f32> {
+    return vec4<f32>(dot(w[0], value), dot(w[1], value), dot(w[2], value), dot(w[3], value));
+}
+
+fn conv_matrix(first: u32) -> mat4x4<f32> {
+    return mat4x4<f32>(
+        conv_weight(first), conv_weight(first + 1u), conv_weight(first + 2u), conv_weight(first + 3u));
+}
+
+// A layer's four outputs for a strip of texels, the first of which has its 3x3 inputs from `place` on, before the
+// activation. Its weights: for every group of outputs, tap and group of inputs a vector of inputs for each of the
+// outputs; behind all the biases.
+fn conv_sums(texels: ConvTexels, place: vec2<u32>, layer: u32, outputs: u32, group: u32) -> mat4x4<f32> {
+    let bias = conv_weight(layer + 36u * texels.groups * outputs + group);
+    var a = bias;
+    var b = bias;
+    var c = bias;
+    var d = bias;
+    let groups = texels.groups;
+    var row_weight = layer + 36u * groups * group;
+    var row = texels.first + (place.x + texels.width * place.y) * groups;
+    for (var y = 0u; y < 3u; y++) {
+        for (var i = 0u; i < groups; i++) {
+            let first = row + i;
+            let v0 = conv_value(first);
+            let v1 = conv_value(first + groups);
+            let v2 = conv_value(first + 2u * groups);
+            let v3 = conv_value(first + 3u * groups);
+            let v4 = conv_value(first + 4u * groups);
+            let v5 = conv_value(first + 5u * groups);
+            let left = conv_matrix(row_weight + 4u * i);
+            a += conv_column(left, v0);
+            b += conv_column(left, v1);
+            c += conv_column(left, v2);
+            d += conv_column(left, v3);
+            let middle = conv_matrix(row_weight + 4u * (groups + i));
+            a += conv_column(middle, v1);
+            b += conv_column(middle, v2);
+            c += conv_column(middle, v3);
+            d += conv_column(middle, v4);
+            let right = conv_matrix(row_weight + 4u * (2u * groups + i));
+            a += conv_column(right, v2);
+            b += conv_column(right, v3);
+            c += conv_column(right, v4);
+            d += conv_column(right, v5);
         }
+        row += texels.width * groups;
+        row_weight += 12u * groups;
     }
-    return sum;
+    return mat4x4<f32>(a, b, c, d);
 }
 
 // The same behind the activation, as halves.
-fn conv_output(texels: ConvTexels, place: vec2<u32>, layer: u32, outputs: u32, group: u32) -> vec2<u32> {
-    return conv_pack(max(conv_sums(texels, place, layer, outputs, group), vec4<f32>(0.0)));
+fn conv_outputs(
+    texels: ConvTexels, place: vec2<u32>, layer: u32, outputs: u32, group: u32) -> array<vec2<u32>, CONV_STRIP> {
+    let sums = conv_sums(texels, place, layer, outputs, group);
+    let zero = vec4<f32>(0.0);
+    return array<vec2<u32>, CONV_STRIP>(
+        conv_pack(max(sums[0], zero)), conv_pack(max(sums[1], zero)),
+        conv_pack(max(sums[2], zero)), conv_pack(max(sums[3], zero)));
 }
 
 // Bilinear interpolation at twice the size, clamped at the edges: where, and how much of the second texel.

@@ -55,11 +55,18 @@ fn decode_halves(corner: vec2<u32>, lane: u32) {
     }
     workgroupBarrier();
     let inputs = ConvTexels(0u, DECODE_OUTER, DECODE_JOINED);
-    for (var i = lane; i < DECODE_HALVES * DECODE_HALVES * DECODE_OWN; i += CONV_LANES) {
-        let place = i / DECODE_OWN;
-        let inside = vec2<u32>(place % DECODE_HALVES, place / DECODE_HALVES);
-        let value = conv_output(inputs, inside, HALF_WEIGHTS, DECODE_OWN, i % DECODE_OWN);
-        conv_memory[DECODE_SHARED + i] = value;
+    let strips = conv_strips(DECODE_HALVES);
+    for (var i = lane; i < strips * DECODE_HALVES * DECODE_OWN; i += CONV_LANES) {
+        let channels = i % DECODE_OWN;
+        let strip = i / DECODE_OWN;
+        let inside = vec2<u32>(CONV_STRIP * (strip % strips), strip / strips);
+        let values = conv_outputs(inputs, inside, HALF_WEIGHTS, DECODE_OWN, channels);
+        for (var k = 0u; k < CONV_STRIP; k++) {
+            let x = inside.x + k;
+            if (x < DECODE_HALVES) {
+                conv_memory[DECODE_SHARED + DECODE_OWN * (x + DECODE_HALVES * inside.y) + channels] = values[k];
+            }
+        }
     }
     workgroupBarrier();
 }
@@ -100,11 +107,15 @@ fn decode_tile(corner: vec2<u32>, lane: u32) {
     workgroupBarrier();
 }
 
-// What the network says about a pixel of the tile: four logits, then two residuals. The head's weights: a vector for
-// each of them, then two of biases.
-fn decode_pixel(inside: vec2<u32>) -> array<vec4<f32>, 2> {
-    let texels = ConvTexels(0u, DECODE_PIXELS, DECODE_LAST);
-    let value = conv_unpack(conv_output(texels, inside, LAST_WEIGHTS, 1u, 0u));
+// The last convolution at a strip of the tile's pixels.
+fn decode_strip(inside: vec2<u32>) -> array<vec2<u32>, CONV_STRIP> {
+    return conv_outputs(ConvTexels(0u, DECODE_PIXELS, DECODE_LAST), inside, LAST_WEIGHTS, 1u, 0u);
+}
+
+// What the network says about a pixel with these outputs of the last convolution: four logits, then two residuals.
+// The head's weights: a vector for each of them, then two of biases.
+fn decode_head(words: vec2<u32>) -> array<vec4<f32>, 2> {
+    let value = conv_unpack(words);
     let logits = conv_weight(HEAD_WEIGHTS + 6u) + vec4<f32>(
         dot(conv_weight(HEAD_WEIGHTS), value),
         dot(conv_weight(HEAD_WEIGHTS + 1u), value),

@@ -1,5 +1,5 @@
 // The mixture of a hole's candidates. The importing text gives the logarithms of their weights without a network,
-// PRIOR_NEIGHBOURS, PRIOR_COARSE, PRIOR_COARSE_THIN, PRIOR_HISTORY.
+// PRIOR_NEIGHBOURS, PRIOR_COARSE, PRIOR_COARSE_THIN, PRIOR_HISTORY, and how much less neighbours that disagree weigh, DOUBT.
 #import candidate
 #import shading
 
@@ -13,6 +13,7 @@ struct Mix {
 struct MixHints {
     logits: vec4<f32>,
     residuals: vec2<f32>, // of coverage and N.V
+    doubt: f32, // the same for every pixel
 }
 
 // Some unit vector perpendicular to a unit vector.
@@ -24,6 +25,8 @@ fn mix_perpendicular(v: vec3<f32>) -> vec3<f32> {
 fn mix_candidates(found: array<Candidate, 4>, hints: MixHints, to_viewer: vec3<f32>) -> Mix {
     var candidates = found;
     var logits = vec4<f32>(PRIOR_NEIGHBOURS, PRIOR_COARSE, PRIOR_COARSE_THIN, PRIOR_HISTORY) + hints.logits;
+    let share = candidates[0].coverage;
+    logits.x -= (DOUBT + hints.doubt) * 4.0 * share * (1.0 - share);
     var most = -3.0e38;
     for (var i = 0u; i < 4u; i++) {
         if (candidates[i].valid) {

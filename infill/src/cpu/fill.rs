@@ -11,7 +11,7 @@ use super::march::march;
 use super::network::{FEATURES, Map, OUTPUTS, network};
 use super::push_pull::{Average, Pyramid};
 use super::reproject;
-use crate::options::{PRIOR, Sources};
+use crate::options::{DOUBT, PRIOR, Sources};
 use crate::weights::Weights;
 
 /// A finished pixel.
@@ -144,9 +144,16 @@ fn perpendicular(v: [f32; 3]) -> [f32; 3] {
     shading::safe_normalize(other, [1.0, 0.0, 0.0])
 }
 
-/// The mixture of a hole's candidates, with what the network says; `None` without any candidate.
-pub fn mix(candidates: &[Packed; 4], output: &[f32], to_viewer: [f32; 3]) -> Option<Filled> {
-    let logit = |i: usize| PRIOR[i] + output[i];
+/// The mixture of a hole's candidates, with what the network says and what its weights add to [`DOUBT`]; `None` without any candidate.
+pub fn mix(
+    candidates: &[Packed; 4],
+    output: &[f32],
+    doubt: f32,
+    to_viewer: [f32; 3],
+) -> Option<Filled> {
+    let share = candidates[0].coverage;
+    let doubt = [(DOUBT + doubt) * 4.0 * share * (1.0 - share), 0.0, 0.0, 0.0];
+    let logit = |i: usize| PRIOR[i] + output[i] - doubt[i];
     let valid = || (0..4).filter(|&i| candidates[i].valid);
     let most = valid().map(logit).reduce(f32::max)?;
     let (mut total, mut coverage, mut facing, mut normal) = (0.0, 0.0, 0.0, [0.0; 3]);
@@ -225,7 +232,7 @@ impl Scene<'_> {
             .zip(&packed)
             .map(|(pixel, candidates)| {
                 let output = outputs.texel(pixel[0] as usize, pixel[1] as usize);
-                candidates.as_ref().and_then(|c| mix(c, output, to_viewer(pixel)))
+                candidates.as_ref().and_then(|c| mix(c, output, weights.doubt(), to_viewer(pixel)))
             })
             .collect();
         Fill { pixels, outputs }

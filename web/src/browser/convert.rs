@@ -4,7 +4,7 @@ use js_sys::Function;
 use volume_io::{FixedRateHeader, Geometry, ReadOptions, convert_bytes};
 use wasm_bindgen::prelude::*;
 
-use crate::link::Link;
+use crate::link::{Link, infill_name};
 
 /// Whether a file with these first bytes can be streamed to the GPU as it is.
 #[wasm_bindgen(js_name = isFixedRate)]
@@ -108,4 +108,10 @@ impl Converted {
 #[wasm_bindgen(js_name = linkedVolume)]
 pub fn linked_volume(fragment: &str) -> Option<String> {
     Link::parse(fragment).volume
+}
+
+/// The in-fill that the part of an address behind `#` asks for, if it does.
+#[wasm_bindgen(js_name = linkedInfill)]
+pub fn linked_infill(fragment: &str) -> Option<String> {
+    Link::parse(fragment).infill.map(|infill| infill_name(infill).to_owned())
 }

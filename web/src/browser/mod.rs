@@ -5,5 +5,7 @@ mod gpu;
 mod present;
 mod viewer;
 
-pub use convert::{Converted, Converter, header_bytes, is_fixed_rate, linked_volume};
+pub use convert::{
+    Converted, Converter, header_bytes, is_fixed_rate, linked_infill, linked_volume,
+};
 pub use viewer::{Picture, Viewer};

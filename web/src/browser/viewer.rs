@@ -4,7 +4,7 @@ use progressive_iso::{
     BlockSortedOptions, Capture, Outputs, PendingCapture, PixelStatus, RendererOptions,
     TraversalStrategy,
 };
-use volume_io::{FixedRateHeader, Geometry};
+use volume_io::Geometry;
 use wasm_bindgen::prelude::*;
 use web_sys::HtmlCanvasElement;
 
@@ -12,9 +12,11 @@ use super::gpu::Gpu;
 use super::present::{Copy, Presenter};
 use crate::bars;
 use crate::camera::Orbit;
-use crate::link::Link;
+use crate::exchange::Exchange;
+use crate::link::{Link, infill_name, infill_named};
 use crate::rows::rows;
-use crate::session::Session;
+use crate::session::{Session, Settings};
+use crate::text;
 
 /// A canvas, and the volume on it.
 #[wasm_bindgen]
@@ -22,9 +24,7 @@ use crate::session::Session;
 pub struct Viewer {
     gpu: Gpu,
     presenter: Presenter,
-    session: Option<Session>,
-    options: RendererOptions,
-    threshold: f64,
+    volumes: Exchange,
     /// In the mode that reads pictures back instead of presenting them.
     copies: bool,
     copy: Option<Copy>,
@@ -54,13 +54,12 @@ impl Viewer {
         let presenter = Presenter::new(&gpu, size);
         gpu.check()?;
         let outputs = Outputs { status: true, depth: copies, ..Outputs::default() };
-        let options = RendererOptions { size, outputs, capture: true, ..Default::default() };
+        let renderer = RendererOptions { size, outputs, capture: true, ..Default::default() };
+        let settings = Settings { renderer, ..Settings::default() };
         Ok(Self {
             gpu,
             presenter,
-            session: None,
-            options,
-            threshold: 1.0,
+            volumes: Exchange::new(settings),
             copies,
             copy: None,
             copy_is_stale: false,
@@ -73,53 +72,53 @@ impl Viewer {
         self.gpu.name()
     }
 
-    /// Replaces the volume by one whose fixed-rate file starts with these bytes, which are to be pushed
-    /// again with the others. `geometry`: spacing and origin, or nothing.
+    /// Begins with a volume whose fixed-rate file starts with these bytes, which are to be pushed again
+    /// with the others. It replaces the one that is shown when it has its first picture.
+    /// `geometry`: spacing and origin, or nothing.
     pub fn open(&mut self, start: &[u8], geometry: &[f64]) -> Result<(), JsError> {
-        let header = FixedRateHeader::parse(start)
-            .ok_or_else(|| JsError::new("no fixed-rate zfp stream of 3D floats"))?;
         let geometry = match *geometry {
             [a, b, c, x, y, z] => Geometry { spacing: [a, b, c], origin: [x, y, z] },
             _ => Geometry::default(),
         };
-        // Two volumes would need two budgets.
-        self.close();
-        let Gpu { device, queue, .. } = &self.gpu;
-        let mut session = Session::new(device, queue, header, geometry, self.options)?;
-        session.set_threshold(self.threshold);
-        self.session = Some(session);
-        Ok(())
+        Ok(self.volumes.open(&self.gpu.device, &self.gpu.queue, start, geometry)?)
     }
 
     /// Takes in the next bytes of the file and returns how many wait for the GPU.
     pub fn push(&mut self, bytes: &[u8]) -> Result<f64, JsError> {
-        let Some(session) = &mut self.session else { return Ok(0.0) };
-        session.push(bytes)?;
-        Ok(session.waiting_bytes() as f64)
+        Ok(self.volumes.push(bytes)? as f64)
     }
 
     /// Bytes that wait for the GPU.
     pub fn waiting(&self) -> f64 {
-        self.session.as_ref().map_or(0.0, |session| session.waiting_bytes() as f64)
+        self.volumes.waiting_bytes() as f64
     }
 
     /// Says that the file has ended.
     pub fn finish(&mut self) -> Result<(), JsError> {
-        self.session.as_mut().map_or(Ok(()), |session| Ok(session.finish()?))
+        Ok(self.volumes.finish()?)
     }
 
-    /// Gives the volume up; what is shown stays.
-    pub fn close(&mut self) {
-        self.session = None;
-        self.capture = None;
+    /// Gives up the volume that is on its way; what is shown stays.
+    #[wasm_bindgen(js_name = giveUp)]
+    pub fn give_up(&mut self) {
+        self.volumes.give_up();
+    }
+
+    /// Whether a volume is on its way, or an error if it has been given up.
+    #[wasm_bindgen(js_name = isOpening)]
+    pub fn is_opening(&mut self) -> Result<bool, JsError> {
+        match self.volumes.take_failure() {
+            Some(failure) => Err(failure.into()),
+            None => Ok(self.volumes.incoming().is_some()),
+        }
     }
 
     /// Goes on, and shows what is new. False when there is nothing left to do until something changes.
     pub fn advance(&mut self) -> Result<bool, JsError> {
         self.gpu.check()?;
-        let Some(session) = &mut self.session else { return Ok(false) };
-        let step = session.advance(&self.gpu.device, &self.gpu.queue)?;
-        let size = session.options().size;
+        let step = self.volumes.advance(&self.gpu.device, &self.gpu.queue)?;
+        let Some(session) = self.volumes.shown() else { return Ok(!step.rests) };
+        let size = session.settings().renderer.size;
         let resized = self.presenter.size() != size;
         if resized {
             self.presenter.resize(&self.gpu, size);
@@ -127,7 +126,8 @@ impl Viewer {
         if step.is_new {
             let mut encoder = self.gpu.encoder();
             let pictures = session.renderer().textures();
-            self.presenter.record_take(&self.gpu, &mut encoder, pictures, step.rests);
+            let all = step.rests || session.is_filled();
+            self.presenter.record_take(&self.gpu, &mut encoder, pictures, all);
             self.gpu.submit(encoder);
         }
         if step.is_new || resized {
@@ -153,7 +153,7 @@ impl Viewer {
     /// [`Viewer::advance`].
     #[wasm_bindgen(js_name = startCapture)]
     pub fn start_capture(&mut self) -> Result<(), JsError> {
-        if let Some(session) = &self.session {
+        if let Some(session) = self.volumes.shown() {
             let mut encoder = self.gpu.encoder();
             let capture = session.renderer().capture(&self.gpu.device, &mut encoder)?;
             self.gpu.submit(encoder);
@@ -171,26 +171,39 @@ impl Viewer {
     }
 
     /// Size of the picture in pixels, memory budget in MiB, share of rays with which a picture is
-    /// complete enough, and whether rays are sorted by block.
-    pub fn set(&mut self, width: u32, height: u32, budget: f64, threshold: f64, sorted: bool) {
-        self.options.size = [width.max(1), height.max(1)];
-        self.options.budget_bytes = (budget * f64::from(1 << 20)) as u64;
-        self.options.strategy = if sorted {
+    /// complete enough, whether rays are sorted by block, and what unfinished pixels show.
+    pub fn set(
+        &mut self,
+        width: u32,
+        height: u32,
+        budget: f64,
+        threshold: f64,
+        sorted: bool,
+        infill: &str,
+    ) {
+        let mut settings = *self.volumes.settings();
+        settings.renderer.size = [width.max(1), height.max(1)];
+        settings.renderer.budget_bytes = (budget * f64::from(1 << 20)) as u64;
+        settings.renderer.strategy = if sorted {
             TraversalStrategy::BlockSorted(BlockSortedOptions::default())
         } else {
             TraversalStrategy::RunAhead
         };
-        self.threshold = threshold;
-        if let Some(session) = &mut self.session {
-            session.set_options(self.options);
-            session.set_threshold(threshold);
-        }
+        settings.threshold = threshold;
+        settings.infill = infill_named(infill).unwrap_or(settings.infill);
+        self.volumes.set(settings);
+    }
+
+    /// Whether the settings that were asked for last are in force.
+    #[wasm_bindgen(js_name = areSettingsApplied)]
+    pub fn are_settings_applied(&self) -> bool {
+        self.volumes.shown().is_some_and(|shown| shown.settings() == self.volumes.settings())
     }
 
     /// Why the last settings were refused, if they were.
     #[wasm_bindgen(js_name = takeRefusal)]
     pub fn take_refusal(&mut self) -> Option<String> {
-        self.session.as_mut()?.take_refusal().map(|error| error.to_string())
+        self.volumes.take_refusal().map(|error| error.to_string())
     }
 
     /// Turns, by shares of the picture's height.
@@ -216,27 +229,31 @@ impl Viewer {
     }
 
     fn change_view(&mut self, change: impl FnOnce(Orbit) -> Orbit) {
-        if let Some(session) = &mut self.session {
+        if let Some(session) = self.volumes.shown_mut() {
             session.set_view(change(session.view()));
         }
     }
 
     /// The value of the surface; `undefined` before there is one.
     pub fn isovalue(&self) -> Option<f32> {
-        self.session.as_ref()?.isovalue()
+        self.volumes.shown()?.isovalue()
     }
 
     /// Changes the surface.
     #[wasm_bindgen(js_name = setIsovalue)]
     pub fn set_isovalue(&mut self, isovalue: f32) {
-        if let Some(session) = &mut self.session {
+        if let Some(session) = self.volumes.shown_mut() {
             session.set_isovalue(isovalue);
         }
     }
 
-    /// Restores isovalue and view from the part of an address behind `#`.
+    /// Restores isovalue and view from the part of an address behind `#`, of the volume that is on its
+    /// way if there is one.
     pub fn restore(&mut self, fragment: &str) {
-        if let Some(session) = &mut self.session {
+        let is_opening = self.volumes.incoming().is_some();
+        let session =
+            if is_opening { self.volumes.incoming_mut() } else { self.volumes.shown_mut() };
+        if let Some(session) = session {
             let link = Link::parse(fragment);
             if let Some(isovalue) = link.isovalue {
                 session.set_isovalue(isovalue);
@@ -249,49 +266,61 @@ impl Viewer {
 
     /// The part of an address behind `#` that restores what is shown of a volume at this address.
     pub fn link(&self, volume: Option<String>) -> String {
-        let session = self.session.as_ref();
+        let session = self.volumes.shown();
         let isovalue = session.and_then(Session::isovalue);
-        Link { volume, isovalue, view: session.map(Session::view) }.format()
+        let infill = Some(self.volumes.settings().infill);
+        Link { volume, isovalue, view: session.map(Session::view), infill }.format()
     }
 
     /// Heights of the histogram's bars, 0 to 1; nothing before the volume is there.
     pub fn bars(&self) -> Vec<f32> {
-        let histogram = self.session.as_ref().and_then(Session::histogram);
+        let histogram = self.volumes.shown().and_then(Session::histogram);
         histogram.map_or_else(Vec::new, |histogram| bars::heights(histogram.counts()))
     }
 
     /// The histogram's range.
     pub fn range(&self) -> Vec<f32> {
-        let histogram = self.session.as_ref().and_then(Session::histogram);
+        let histogram = self.volumes.shown().and_then(Session::histogram);
         histogram.map_or_else(Vec::new, |histogram| histogram.range().to_vec())
     }
 
-    /// Share of the volume that is on the GPU, 0 to 1.
+    /// Share of the newest volume that is on the GPU, 0 to 1.
     pub fn loaded(&self) -> f32 {
-        self.session.as_ref().map_or(0.0, |session| session.report().loaded)
+        self.volumes
+            .incoming()
+            .or(self.volumes.shown())
+            .map_or(0.0, |session| session.report().loaded)
     }
 
     /// Finished share of the rays that enter the volume, 0 to 1.
     pub fn completeness(&self) -> f64 {
-        self.session.as_ref().map_or(0.0, |session| session.report().completeness())
+        self.volumes.shown().map_or(0.0, |session| session.report().completeness())
     }
 
     /// Read-outs: names and values in turn.
     pub fn rows(&self) -> Vec<String> {
-        let rows = self.session.as_ref().map(rows).unwrap_or_default();
+        let mut rows = self.volumes.shown().map(rows).unwrap_or_default();
+        if let (false, Some(incoming)) = (rows.is_empty(), self.volumes.incoming()) {
+            rows.push(("next volume", text::bytes(incoming.report().bytes)));
+        }
         rows.into_iter().flat_map(|(name, value)| [name.to_owned(), value]).collect()
+    }
+
+    /// Name of what unfinished pixels are asked to show.
+    pub fn infill(&self) -> String {
+        infill_name(self.volumes.settings().infill).to_owned()
     }
 
     /// Milliseconds and completeness of the frame's passes in turn.
     pub fn passes(&self) -> Vec<f64> {
-        let passes = self.session.as_ref().map_or(&[][..], Session::passes);
+        let passes = self.volumes.shown().map_or(&[][..], Session::passes);
         passes.iter().flat_map(|pass| [pass.ms, pass.completeness]).collect()
     }
 
     /// Most bytes of GPU memory that the renderer ever had.
     #[wasm_bindgen(js_name = peakBytes)]
     pub fn peak_bytes(&self) -> f64 {
-        self.session.as_ref().map_or(0.0, |session| session.report().peak_bytes as f64)
+        self.volumes.shown().map_or(0.0, |session| session.report().peak_bytes as f64)
     }
 }
 
