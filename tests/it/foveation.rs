@@ -286,6 +286,32 @@ fn in_fill_fills_what_was_not_cast() {
 }
 
 #[test]
+fn rays_that_were_not_cast_leave_their_whole_way_open() {
+    let (gpu, scene) = (Gpu::new(), scene());
+    let cells = scene.volume.dims.map(|n| (n - 1) as f32);
+    let diagonal = cells.iter().map(|n| n * n).sum::<f32>().sqrt();
+    for size in [[1, 1], [40, 30]] {
+        for options in ways().map(|options| RendererOptions { size, ..options }) {
+            let mut renderer = gpu.renderer(&scene, options);
+            // Nothing is cast before the last pass.
+            let foveation =
+                Foveation { sigma: 0.0, base_density: 0.0, passes: 3, ..Foveation::default() };
+            let mut waiting = 0;
+            render(&gpu, &mut renderer, &frame(&scene, Some(foveation)), |_, report| {
+                if report.pass < foveation.passes {
+                    waiting += 1;
+                    assert!(report.active_rays > 0 && report.sampled_rays == 0, "{report:?}");
+                    let open = report.open_depth_voxels;
+                    assert!((open - diagonal).abs() < 1e-3 * diagonal, "{open} of {diagonal}");
+                }
+                assert!(!report.complete() || report.open_depth_voxels == 0.0, "{report:?}");
+            });
+            assert!(waiting > 0);
+        }
+    }
+}
+
+#[test]
 fn foveation_must_be_planned_and_in_range() {
     let (gpu, scene) = (Gpu::new(), scene());
     let view = |foveation| frame(&scene, Some(foveation));

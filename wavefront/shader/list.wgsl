@@ -51,9 +51,11 @@ fn write_args(active_count: u32, allowed: u32) {
     atomicStore(&rays[RAYS_LISTED], listed);
     atomicAdd(&rays[RAYS_LISTS], 1u);
     atomicMax(&rays[RAYS_MOST_CELLS], atomicExchange(&rays[RAYS_CELLS], 0u));
-    // Rays that this round's list did not have have not been looked at: their whole way is open.
+    // Rays that this round's list did not have have not been looked at, and those that the new one does not have
+    // may never have been: their whole way is open.
     let across = length(vec3<f32>(frame.grid.last_cell + vec3<i32>(1)));
-    let unlisted = select(0u, bitcast<u32>(across), was_active > was_listed);
+    let is_any_unlisted = was_active > was_listed || active_count > listed;
+    let unlisted = select(0u, bitcast<u32>(across), is_any_unlisted);
     atomicStore(&rays[RAYS_OPEN], max(atomicExchange(&rays[RAYS_OPEN_NOW], 0u), unlisted));
     let walk = indirect_fold((listed + 63u) / 64u);
     args[0] = walk.x;
