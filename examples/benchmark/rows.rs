@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::frame::{FrameRow, Key};
+use crate::support::median;
 
 /// Medians over the frames that share a key. `docs/benchmark.md` explains the keys.
 #[derive(Clone, Debug, Serialize)]
@@ -61,17 +62,6 @@ pub fn medians(frames: &[FrameRow]) -> Vec<Row> {
         }
     }
     groups.iter().map(|group| row(group)).collect()
-}
-
-/// Middle value; the mean of the two middle ones for an even count.
-pub fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    match values.len() {
-        0 => f64::NAN,
-        n if n % 2 == 1 => values[n / 2],
-        n => (values[n / 2 - 1] + values[n / 2]) / 2.0,
-    }
 }
 
 /// The smallest value that 95 % of the values do not exceed.

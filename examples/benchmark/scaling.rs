@@ -5,9 +5,9 @@ use progressive_iso::{ScenePlan, wgpu};
 use serde::Serialize;
 
 use crate::measure::{Measured, Results, Skipped, options};
-use crate::rows::median;
 use crate::scene::{Scene, View};
 use crate::sets::{FIVE_POSITIONS, SMALL, Setting, block_sorted, default_look_ahead, run_ahead};
+use crate::support::median;
 use crate::support::subject::{Subject, cube, turbulence};
 use crate::support::{Failure, Gpu};
 

@@ -4,7 +4,8 @@ use serde::Serialize;
 
 use crate::frame::FrameRow;
 use crate::library::Wanted;
-use crate::rows::{Row, median};
+use crate::rows::Row;
+use crate::support::median;
 
 /// RunAhead against BlockSorted on one volume: the best setting of each, by the medians.
 #[derive(Clone, Debug, Serialize)]

@@ -177,6 +177,14 @@ pub struct Shown {
     pub surface: Option<Vec<bool>>,
 }
 
+impl Shown {
+    /// From red, green, blue and a word more of every pixel, f32, as the published network has them.
+    pub fn from_words(words: &[u32]) -> Self {
+        let color = |p: &[u32]| [p[0], p[1], p[2]].map(|v| f32::from_bits(v).clamp(0.0, 1.0));
+        Self { colors: words.chunks_exact(4).map(color).collect(), surface: None }
+    }
+}
+
 impl From<&Capture> for Shown {
     fn from(capture: &Capture) -> Self {
         let pixels = || capture.color.chunks_exact(4);

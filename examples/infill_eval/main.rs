@@ -9,8 +9,6 @@
 #![allow(unreachable_pub, reason = "the modules of a program")]
 
 mod contender;
-#[cfg(feature = "published-network")]
-mod published;
 mod rows;
 mod sequence;
 mod subject;

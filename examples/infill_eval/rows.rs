@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use crate::contender::Shown;
 use crate::subject::Motion;
-use crate::support::Table;
+use crate::support::{Table, median};
 
 /// Measures of one picture.
 #[derive(Clone, Debug)]
@@ -88,11 +88,6 @@ fn mean(values: impl Iterator<Item = Option<f64>>) -> Option<f64> {
     (!finite.is_empty()).then(|| finite.iter().sum::<f64>() / finite.len() as f64)
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
-}
-
 fn distinct<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<T> {
     let mut found = Vec::new();
     for value in values {
@@ -123,7 +118,7 @@ impl Row {
                 iou_holes: mean(own.iter().map(|f| f.iou_holes)),
                 tpsnr: mean(own.iter().map(|f| f.tpsnr)),
                 flip: mean(own.iter().map(|f| f.flip)),
-                ms: median(own.iter().map(|f| f.ms).collect()),
+                ms: median(own.iter().map(|f| f.ms)),
                 bytes: own.iter().map(|f| f.bytes).max().unwrap_or(0),
             }
         };
@@ -184,7 +179,7 @@ pub fn tables(rows: &[Row]) -> String {
                 of(|r| r.iou_holes),
             ]);
             cells.extend([of(|r| r.tpsnr), of(|r| r.flip)]);
-            cells.push(format!("{:.1}", median(own.iter().map(|r| r.ms).collect())));
+            cells.push(format!("{:.1}", median(own.iter().map(|r| r.ms))));
             cells.push(own.iter().map(|r| r.bytes).max().unwrap_or(0).to_string());
             cells.extend(
                 volumes.iter().map(|v| {

@@ -5,11 +5,11 @@ use std::path::Path;
 use progressive_iso::InfillWeights;
 
 use crate::contender::{Contender, Cut, Shown, WAYS, holes, nearest};
-#[cfg(feature = "published-network")]
-use crate::published::PublishedNetwork;
 use crate::rows::{Frame, Row};
 use crate::subject::{Motion, Subject};
-use crate::support::{Failure, Gpu};
+#[cfg(feature = "published-network")]
+use crate::support::published::PublishedNetwork;
+use crate::support::{Failure, Gpu, read_words};
 
 /// The renderers for one volume.
 pub struct Sequence {
@@ -154,7 +154,8 @@ impl Sequence {
         if new_start {
             network.clear(gpu)?;
         }
-        let (shown, ms) = network.fill(gpu)?;
+        let ms = network.fill(gpu)?;
+        let shown = Shown::from_words(&read_words(gpu, network.output())?);
         Ok(Some(Made { method: "published", shown, ms, bytes: network.bytes }))
     }
 

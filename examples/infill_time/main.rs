@@ -9,8 +9,6 @@
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a command-line program")]
 #![allow(unreachable_pub, reason = "the modules of a program")]
 
-#[cfg(feature = "published-network")]
-mod published;
 #[path = "../support/mod.rs"]
 mod support;
 
@@ -23,7 +21,7 @@ use progressive_iso::{
     InfillWeights, Outputs, ProgressiveIsoRenderer, RendererOptions, Residency, TraversalStrategy,
 };
 use serde::Serialize;
-use support::{Failure, Gpu, Origin, Table};
+use support::{Failure, Gpu, Origin, Table, median};
 
 const EDGE: u32 = 192;
 /// Bits per voxel.
@@ -96,7 +94,7 @@ struct Orbit {
     isovalue: f32,
     size: [u32; 2],
     #[cfg(feature = "published-network")]
-    published: Option<published::PublishedNetwork>,
+    published: Option<support::published::PublishedNetwork>,
 }
 
 impl Orbit {
@@ -120,9 +118,12 @@ impl Orbit {
         let renderer = ProgressiveIsoRenderer::new(&gpu.device, &gpu.queue, volume, options)?;
         #[cfg(feature = "published-network")]
         let published = match &arguments.published {
-            Some(path) => {
-                Some(published::PublishedNetwork::new(&gpu, &renderer, arguments.size, path)?)
-            }
+            Some(path) => Some(support::published::PublishedNetwork::new(
+                &gpu,
+                &renderer,
+                arguments.size,
+                path,
+            )?),
             None => None,
         };
         Ok(Self {
@@ -193,6 +194,7 @@ impl Orbit {
     #[cfg(feature = "published-network")]
     fn measure_published(&self, samples: &mut BTreeMap<Key, Samples>) -> Result<(), Failure> {
         if let Some(published) = &self.published {
+            published.clear(&self.gpu)?;
             let ms = published.fill(&self.gpu)?;
             let own = samples.entry(("published-network", 1_000_000)).or_default();
             own.ms.entry("fill".to_owned()).or_default().push(ms);
@@ -201,16 +203,13 @@ impl Orbit {
     }
 }
 
-fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
-}
-
 impl Row {
     fn new((method, millionths): Key, samples: &Samples) -> Self {
-        let stage_ms: BTreeMap<_, _> =
-            samples.ms.iter().map(|(stage, ms)| (stage.clone(), median(ms))).collect();
+        let stage_ms: BTreeMap<_, _> = samples
+            .ms
+            .iter()
+            .map(|(stage, ms)| (stage.clone(), median(ms.iter().copied())))
+            .collect();
         let sum_ms = stage_ms.values().sum();
         let completeness_pixels = millionths as f64 * 1e-6;
         Self { method, completeness_pixels, holes: samples.holes, stage_ms, sum_ms }

@@ -6,6 +6,8 @@ mod origin;
 mod table;
 
 pub mod plot;
+#[cfg(feature = "published-network")]
+pub mod published;
 pub mod subject;
 
 use std::path::Path;
@@ -100,6 +102,17 @@ impl Gpu {
         Err(refusals.trim_end_matches("; ").into())
     }
 
+    /// Runs what is recorded, blocking on the device until it is done.
+    pub fn run(&self, record: impl FnOnce(&mut wgpu::CommandEncoder)) -> Result<(), Failure> {
+        let mut encoder = self.device.create_command_encoder(&Default::default());
+        record(&mut encoder);
+        #[expect(clippy::disallowed_methods, reason = "the program owns the queue")]
+        self.queue.submit([encoder.finish()]);
+        #[expect(clippy::disallowed_methods, reason = "the program may block")]
+        self.device.poll(wgpu::PollType::wait_indefinitely())?;
+        Ok(())
+    }
+
     pub fn name(&self) -> String {
         adapter_name(&self.info)
     }
@@ -144,14 +157,22 @@ fn read_back(
         usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
         mapped_at_creation: false,
     });
-    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    copy(&mut encoder, &buffer);
-    encoder.map_buffer_on_submit(&buffer, wgpu::MapMode::Read, .., |_| {});
-    #[expect(clippy::disallowed_methods, reason = "the program owns the queue")]
-    gpu.queue.submit([encoder.finish()]);
-    #[expect(clippy::disallowed_methods, reason = "the program may block")]
-    gpu.device.poll(wgpu::PollType::wait_indefinitely())?;
+    gpu.run(|encoder| {
+        copy(encoder, &buffer);
+        encoder.map_buffer_on_submit(&buffer, wgpu::MapMode::Read, .., |_| {});
+    })?;
     Ok(buffer.get_mapped_range(..)?.to_vec())
+}
+
+/// Middle value; the mean of the two middle ones for an even count, NaN for none.
+pub fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    match values.len() {
+        0 => f64::NAN,
+        n if n % 2 == 1 => values[n / 2],
+        n => (values[n / 2 - 1] + values[n / 2]) / 2.0,
+    }
 }
 
 /// Width and height from `WIDTHxHEIGHT`, for command lines.

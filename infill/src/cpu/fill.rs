@@ -144,7 +144,8 @@ fn perpendicular(v: [f32; 3]) -> [f32; 3] {
     shading::safe_normalize(other, [1.0, 0.0, 0.0])
 }
 
-/// The mixture of a hole's candidates, with what the network says and what its weights add to [`DOUBT`]; `None` without any candidate.
+/// The mixture of a hole's candidates, with what the network says and what its weights add to [`DOUBT`];
+/// `None` without any candidate.
 pub fn mix(
     candidates: &[Packed; 4],
     output: &[f32],

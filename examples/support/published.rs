@@ -1,4 +1,4 @@
-//! The published network on a renderer's picture.
+//! The published in-fill network on a renderer's pictures.
 
 use std::path::Path;
 use std::time::Instant;
@@ -10,14 +10,17 @@ use infill::published::{
 };
 use progressive_iso::{ProgressiveIsoRenderer, wgpu};
 
-use crate::support::{Failure, Gpu};
+use super::{Failure, Gpu};
 
+/// The network on one picture, which has to have its status.
 pub struct PublishedNetwork {
     stage: Published,
     buffers: PublishedBuffers,
+    pub bytes: u64,
 }
 
 impl PublishedNetwork {
+    /// `weights`: a file that `infill/training/convert_published.py` made.
     pub fn new(
         gpu: &Gpu,
         renderer: &ProgressiveIsoRenderer,
@@ -31,26 +34,25 @@ impl PublishedNetwork {
         let status = renderer.textures().status().ok_or("a picture without status")?;
         let status = status.create_view(&wgpu::TextureViewDescriptor::default());
         let picture = PublishedPicture { color: renderer.color_view(), status: &status };
-        let buffers =
-            PublishedBuffers::new(&gpu.device, &Ledger::new(), &stage, &plan, &weights, picture);
-        Ok(Self { stage, buffers })
+        let ledger = Ledger::new();
+        let buffers = PublishedBuffers::new(&gpu.device, &ledger, &stage, &plan, &weights, picture);
+        Ok(Self { stage, buffers, bytes: ledger.total() })
     }
 
-    /// Fills the picture from an empty state: wall milliseconds.
+    /// Forgets the pictures filled so far.
+    pub fn clear(&self, gpu: &Gpu) -> Result<(), Failure> {
+        gpu.run(|encoder| self.buffers.record_clear_state(encoder))
+    }
+
+    /// Fills the picture as it is now: wall milliseconds.
     pub fn fill(&self, gpu: &Gpu) -> Result<f64, Failure> {
-        submit(gpu, |encoder| self.buffers.record_clear_state(encoder))?;
         let start = Instant::now();
-        submit(gpu, |encoder| self.stage.record(encoder, &self.buffers))?;
+        gpu.run(|encoder| self.stage.record(encoder, &self.buffers))?;
         Ok(start.elapsed().as_secs_f64() * 1e3)
     }
-}
 
-fn submit(gpu: &Gpu, record: impl Fn(&mut wgpu::CommandEncoder)) -> Result<(), Failure> {
-    let mut encoder = gpu.device.create_command_encoder(&Default::default());
-    record(&mut encoder);
-    #[expect(clippy::disallowed_methods, reason = "the program owns the queue")]
-    gpu.queue.submit([encoder.finish()]);
-    #[expect(clippy::disallowed_methods, reason = "the program may block")]
-    gpu.device.poll(wgpu::PollType::wait_indefinitely())?;
-    Ok(())
+    /// Red, green, blue and a word more of every pixel, f32, as the last fill made them.
+    pub fn output(&self) -> &wgpu::Buffer {
+        self.buffers.output()
+    }
 }
