@@ -25,8 +25,8 @@ pub use error::Error;
 pub use gpu_primitives::memory::Category;
 pub use infill::{Sources as InfillSources, Weights as InfillWeights};
 pub use options::{
-    Completeness, Frame, FrameOptions, Infill, InfillOptions, RendererOptions, Residency,
-    TraversalStrategy,
+    Completeness, Frame, FrameOptions, Infill, InfillOptions, InfillWhen, RendererOptions,
+    Residency, TraversalStrategy,
 };
 pub use plan::{Part, ScenePlan, When, Work};
 pub use renderer::ProgressiveIsoRenderer;

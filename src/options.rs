@@ -32,6 +32,19 @@ pub enum Residency {
     Full,
 }
 
+/// When filling unfinished pixels is part of a scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum InfillWhen {
+    /// Not where the whole volume is resident and no frame is foveated: every ray ends in a frame's first pass
+    /// there, unless a dispatch would take long, so there is nothing to fill. [`crate::ScenePlan`] leaves it out, frames
+    /// may ask for it all the same, and unfinished pixels show [`Shading::unfinished`].
+    #[default]
+    WhereItPays,
+    /// Always.
+    Always,
+}
+
 /// What filling unfinished pixels may use, for the life of a renderer.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct InfillOptions {
@@ -41,6 +54,8 @@ pub struct InfillOptions {
     pub network: Option<&'static Weights>,
     /// What [`FrameOptions::guided`] needs; nothing where the whole volume is resident.
     pub guided: bool,
+    /// Whether a scene that has next to nothing to fill has it, too.
+    pub when: InfillWhen,
 }
 
 /// What shows where a pixel is unfinished.
@@ -105,11 +120,17 @@ impl Default for RendererOptions {
 }
 
 impl RendererOptions {
-    /// The outputs, with those that other choices need.
-    pub(crate) fn all_outputs(&self) -> Outputs {
-        let infill = self.infill.is_some();
+    /// The outputs, with those that other choices need; `infill`: whether pixels are filled.
+    pub(crate) fn all_outputs(&self, infill: bool) -> Outputs {
         let depth = self.outputs.depth || self.draw_target.is_some() || infill;
         Outputs { depth, normal: self.outputs.normal || infill, ..self.outputs }
+    }
+
+    /// What fills unfinished pixels where the whole volume is resident, or where it is not.
+    pub(crate) fn infill_in(&self, resident: bool) -> Option<InfillOptions> {
+        self.infill.filter(|infill| {
+            infill.when == InfillWhen::Always || !resident || self.foveation.is_some()
+        })
     }
 
     /// Whether a frame may be filled, guided and foveated as it asks.
@@ -129,11 +150,6 @@ impl RendererOptions {
             Some(foveation) => Ok(foveation.check()?),
             None => Ok(()),
         }
-    }
-
-    /// What pictures there are and where they go.
-    pub(crate) fn pictures(&self) -> (Outputs, Option<DrawTarget>) {
-        (self.all_outputs(), self.draw_target)
     }
 }
 

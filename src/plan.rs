@@ -15,7 +15,7 @@ use crate::records::{CONTROL_BYTES, PASSES_IN_FLIGHT, readback_bytes};
 use crate::samples::SamplePlan;
 use crate::schedule::FIRST_CELLS;
 use crate::strategy::StrategyPlan;
-use crate::{CompressedVolume, Error, RendererOptions, Residency, capture, wgpu};
+use crate::{CompressedVolume, Error, InfillOptions, RendererOptions, Residency, capture, wgpu};
 
 /// Largest upload chunk of a frame's parameters.
 pub(crate) const PARAMS_CHUNK: u64 = 1024;
@@ -74,6 +74,8 @@ pub struct ScenePlan {
     pub(crate) wavefront: WavefrontPlan,
     pub(crate) strategy: StrategyPlan,
     pub(crate) infill: Option<InfillPlan>,
+    /// Those asked for, unless in-fill does not pay.
+    pub(crate) infill_options: Option<InfillOptions>,
     parts: Vec<Part>,
     budget_bytes: u64,
 }
@@ -112,28 +114,18 @@ impl ScenePlan {
         load: Option<LoadPlan>,
     ) -> Result<Self, Error> {
         check_limits(limits)?;
-        let payload = PayloadPlan::new(layout, limits)?;
-        let macrocell = MacrocellPlan::new(layout.dims, limits)?;
-        let outputs = options.all_outputs();
-        let wavefront =
-            WavefrontPlan::new(options.size, outputs, limits)?.with_foveation(options.foveation);
-        let strategy = StrategyPlan::new(options.strategy, wavefront.rays(), limits)?;
-        let infill = options
-            .infill
-            .map(|infill| {
-                let network = infill.network.is_some();
-                InfillPlan::new(options.size, infill.sources, network, &macrocell, limits)
-            })
-            .transpose()?;
-        let scene =
-            Scene { options, limits, payload, macrocell, load, wavefront, strategy, infill };
+        let scene = |resident| Scene::new(layout, options, limits, load, resident);
         match options.residency {
-            Residency::Cached => scene.cached(),
-            Residency::Full => scene.resident(),
-            Residency::Auto if scene.may_be_resident() => {
-                scene.resident().or_else(|_| scene.cached())
+            Residency::Cached => scene(false)?.cached(),
+            Residency::Full => scene(true)?.resident(),
+            Residency::Auto => {
+                let auto = scene(true)?;
+                let resident = auto.may_be_resident().then(|| auto.resident());
+                match resident {
+                    Some(Ok(plan)) => Ok(plan),
+                    _ => scene(false)?.cached(),
+                }
             }
-            Residency::Auto => scene.cached(),
         }
     }
 
@@ -245,9 +237,44 @@ struct Scene<'a> {
     wavefront: WavefrontPlan,
     strategy: StrategyPlan,
     infill: Option<InfillPlan>,
+    /// What of the options' in-fill pays.
+    infill_options: Option<InfillOptions>,
 }
 
-impl Scene<'_> {
+impl<'a> Scene<'a> {
+    fn new(
+        layout: &StreamLayout,
+        options: &'a RendererOptions,
+        limits: &'a wgpu::Limits,
+        load: Option<LoadPlan>,
+        resident: bool,
+    ) -> Result<Self, Error> {
+        let payload = PayloadPlan::new(layout, limits)?;
+        let macrocell = MacrocellPlan::new(layout.dims, limits)?;
+        let infill_options = options.infill_in(resident);
+        let outputs = options.all_outputs(infill_options.is_some());
+        let wavefront =
+            WavefrontPlan::new(options.size, outputs, limits)?.with_foveation(options.foveation);
+        let strategy = StrategyPlan::new(options.strategy, wavefront.rays(), limits)?;
+        let infill = infill_options
+            .map(|infill| {
+                let network = infill.network.is_some();
+                InfillPlan::new(options.size, infill.sources, network, &macrocell, limits)
+            })
+            .transpose()?;
+        Ok(Self {
+            options,
+            limits,
+            payload,
+            macrocell,
+            load,
+            wavefront,
+            strategy,
+            infill,
+            infill_options,
+        })
+    }
+
     fn blocks(&self) -> u64 {
         self.macrocell.grid().block_count()
     }
@@ -330,6 +357,7 @@ impl Scene<'_> {
             wavefront: self.wavefront.clone(),
             strategy: self.strategy,
             infill: self.infill.clone(),
+            infill_options: self.infill_options,
             parts,
             budget_bytes: self.options.budget_bytes,
         }
@@ -392,6 +420,9 @@ impl Scene<'_> {
             match &self.infill {
                 Some(plan) => {
                     Part::new("infill", When::Rendering, plan.bytes(), infill_names(plan))
+                }
+                None if options.infill.is_some() => {
+                    Part::left_out("infill", "every block is resident: nothing to fill")
                 }
                 None => Part::left_out("infill", "not asked for"),
             },

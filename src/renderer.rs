@@ -125,7 +125,7 @@ impl ProgressiveIsoRenderer {
         let (stages, load_stages) = faults.guard(device, Task::Pipelines, || {
             Ok((Stages::new(device, &plan, &options)?, LoadStages::new(device, &plan)?))
         })?;
-        let infill = options.infill.is_some();
+        let infill = plan.infill.is_some();
         let upload = UploadRing::new(&ledger, "progressive-iso.upload", PARAMS_CHUNK);
         let (buffers, pictures, loader, records) = faults.guard(device, Task::Other, || {
             let buffers = VolumeBuffers::new(device, &ledger, &stages, &plan);

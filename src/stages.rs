@@ -64,7 +64,7 @@ impl Stages {
         options: &RendererOptions,
     ) -> Result<Self, Error> {
         let _span = tracing::info_span!("progressive_iso.pipelines").entered();
-        let layout = plan.samples.layout();
+        let (layout, asked) = (plan.samples.layout(), plan.infill_options);
         Ok(Self {
             activate: Activate::new(device, plan.macrocell.grid().has_third_level()),
             samples: SampleStages::new(device, &plan.samples)?,
@@ -76,8 +76,8 @@ impl Stages {
             draw: options.draw_target.map(|target| Draw::new(device, &target)),
             infill: plan.infill.as_ref().map(|plan| InfillStage {
                 stage: infill::Infill::new(device, plan),
-                weights: options.infill.and_then(|infill| infill.network),
-                guide: (options.infill.is_some_and(|infill| infill.guided) && !layout.resident)
+                weights: asked.and_then(|infill| infill.network),
+                guide: (asked.is_some_and(|infill| infill.guided) && !layout.resident)
                     .then(|| Guide::new(device, plan))
                     .flatten(),
             }),

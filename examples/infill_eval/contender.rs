@@ -4,9 +4,9 @@ use std::path::Path;
 use std::time::Instant;
 
 use progressive_iso::{
-    BlockSortedOptions, Camera, Capture, CompressedVolume, Frame, FrameOptions, Infill,
-    InfillOptions, InfillSources, InfillWeights, Outputs, PassReport, PixelStatus,
-    ProgressiveIsoRenderer, RendererOptions, Residency, Shading, TraversalStrategy,
+    Camera, Capture, CompressedVolume, Frame, FrameOptions, Infill, InfillOptions, InfillSources,
+    InfillWeights, Outputs, PassReport, PixelStatus, ProgressiveIsoRenderer, RendererOptions,
+    Residency, Shading, TraversalStrategy,
 };
 
 use crate::support::{Failure, Gpu};
@@ -69,6 +69,9 @@ pub const WAYS: [Way; 6] = [
     },
 ];
 
+/// Those whose pictures are timed.
+pub const CURVE_WAYS: [Way; 3] = [WAYS[0], WAYS[3], WAYS[4]];
+
 /// A renderer with its way to fill.
 pub struct Contender {
     pub way: Way,
@@ -90,6 +93,7 @@ impl Contender {
         size: [u32; 2],
         way: Way,
         weights: &'static InfillWeights,
+        strategy: TraversalStrategy,
     ) -> Result<Self, Failure> {
         let network = (way.infill == Infill::Network).then_some(weights);
         let options = RendererOptions {
@@ -102,7 +106,7 @@ impl Contender {
                 ..Default::default()
             }),
             capture: true,
-            strategy: TraversalStrategy::BlockSorted(BlockSortedOptions::default()),
+            strategy,
             residency: Residency::Cached,
             ..Default::default()
         };

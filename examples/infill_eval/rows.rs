@@ -32,6 +32,8 @@ pub struct Row {
     pub degrees: f64,
     pub frames: usize,
     pub completeness_pixels: f64,
+    /// Share of the frames whose picture equals the finished one; they have no PSNR.
+    pub exact: f64,
     pub psnr: Option<f64>,
     pub ssim: Option<f64>,
     pub psnr_holes: Option<f64>,
@@ -112,6 +114,8 @@ impl Row {
                 frames: own.len(),
                 completeness_pixels: own.iter().map(|f| f.completeness_pixels).sum::<f64>()
                     / own.len() as f64,
+                exact: own.iter().filter(|f| f.psnr == f64::INFINITY).count() as f64
+                    / own.len() as f64,
                 psnr: mean(own.iter().map(|f| Some(f.psnr))),
                 ssim: mean(own.iter().map(|f| Some(f.ssim))),
                 psnr_holes: mean(own.iter().map(|f| f.psnr_holes)),
@@ -148,6 +152,7 @@ pub fn tables(rows: &[Row]) -> String {
     for cut in distinct(rows.iter().map(|r| r.cut)) {
         let mut heads = vec![
             "method",
+            "exact, %",
             "PSNR",
             "SSIM",
             "PSNR of holes",
@@ -171,7 +176,8 @@ pub fn tables(rows: &[Row]) -> String {
                     .map(|v| mean(own.iter().filter(|r| r.volume == *v).map(|r| value(r))));
                 cell(mean(per_volume))
             };
-            let mut cells = vec![method.to_owned()];
+            let exact = own.iter().map(|r| r.exact).sum::<f64>() / own.len() as f64;
+            let mut cells = vec![method.to_owned(), format!("{:.0}", 100.0 * exact)];
             cells.extend([
                 of(|r| r.psnr),
                 of(|r| r.ssim),

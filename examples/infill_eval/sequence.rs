@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use progressive_iso::InfillWeights;
+use progressive_iso::{BlockSortedOptions, InfillWeights, TraversalStrategy};
 
 use crate::contender::{Contender, Cut, Shown, WAYS, holes, nearest};
 use crate::rows::{Frame, Row};
@@ -36,9 +36,10 @@ impl Sequence {
         weights: &'static InfillWeights,
         published: Option<&Path>,
     ) -> Result<Self, Failure> {
+        let strategy = TraversalStrategy::BlockSorted(BlockSortedOptions::default());
         let contenders = WAYS
             .iter()
-            .map(|way| Contender::new(gpu, &subject.volume, size, *way, weights))
+            .map(|way| Contender::new(gpu, &subject.volume, size, *way, weights, strategy))
             .collect::<Result<Vec<_>, _>>()?;
         if published.is_some() && !cfg!(feature = "published-network") {
             return Err("--published needs the feature published-network".into());

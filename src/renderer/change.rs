@@ -34,10 +34,11 @@ impl ProgressiveIsoRenderer {
         if let Some(state) = &self.frame {
             options.check_frame(&state.frame.options)?;
         }
-        let pictures = self.options.pictures() != options.pictures();
+        let pictures = self.options.draw_target != options.draw_target
+            || self.plan.wavefront.outputs() != plan.wavefront.outputs();
         let (layout, strategy) = (plan.samples.layout(), plan.strategy);
         if pictures
-            || options.infill != self.options.infill
+            || plan.infill_options != self.plan.infill_options
             || options.foveation != self.options.foveation
             || (layout, strategy) != (self.plan.samples.layout(), self.plan.strategy)
         {
@@ -53,7 +54,7 @@ impl ProgressiveIsoRenderer {
                 Ok(())
             })?;
         }
-        self.records.set_infill(options.infill.is_some());
+        self.records.set_infill(plan.infill.is_some());
         self.options = options;
         self.plan = plan;
         if let Some(state) = self.frame.take() {

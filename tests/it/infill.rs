@@ -8,9 +8,9 @@ use infill::cpu::reproject::{self, EMPTY, OldHit};
 use infill::{Sources, Weights};
 use macrocell::Grid;
 use progressive_iso::{
-    BlockSortedOptions, Camera, Capture, Completeness, Error, Frame, FrameOptions, FrameView,
-    Infill, InfillOptions, PassReport, PixelStatus, ProgressiveIsoRenderer, RendererOptions,
-    Residency, TraversalStrategy,
+    BlockSortedOptions, BlueNoise, Camera, Capture, Completeness, Error, Frame, FrameOptions,
+    FrameView, Infill, InfillOptions, InfillWhen, PassReport, PixelStatus, ProgressiveIsoRenderer,
+    RendererOptions, Residency, TraversalStrategy,
 };
 use wavefront::cpu::frame::{FrameRay, RayStates};
 use wavefront::cpu::shading;
@@ -203,7 +203,8 @@ impl Case {
         let gpu = Gpu::new();
         let scene = Scene::generated("turbulence", [70, 66, 61], 8.0);
         let Self { sources, weights, .. } = *self;
-        let options = with_infill(InfillOptions { sources, network: weights, guided: false });
+        let options =
+            with_infill(InfillOptions { sources, network: weights, ..Default::default() });
         let mut renderer = gpu.renderer(&scene, options);
         let (first, second) = (self.frame(&scene, 20.0), self.frame(&scene, 24.0));
         render_until(&gpu, &mut renderer, &first, 0.6);
@@ -474,6 +475,46 @@ fn infill_comes_and_goes_with_the_options() {
         assert_eq!(report.filled_pixels, 0);
         assert!(report.bytes <= renderer.plan().rendering_bytes(), "{report:?}");
     }
+}
+
+#[test]
+fn infill_is_left_out_where_every_ray_ends_in_the_first_pass() {
+    let (gpu, scene) = (Gpu::new(), Scene::generated("turbulence", [45, 41, 38], 8.0));
+    let full = |infill| RendererOptions { residency: Residency::Full, infill, ..options(SIZE) };
+    let usual = InfillOptions { network: Some(Weights::trained()), ..Default::default() };
+    let frame = frame_with(&scene, 20.0, Infill::Network);
+    let part = |renderer: &ProgressiveIsoRenderer| {
+        let parts = renderer.plan().parts();
+        let part = parts.iter().find(|part| part.name == "infill").unwrap();
+        (part.included, part.why.clone())
+    };
+
+    let mut without = gpu.renderer(&scene, full(None));
+    let plain = frame_with(&scene, 20.0, Infill::Off);
+    let expected = gpu.finish(&mut without, &plain);
+    let mut renderer = gpu.renderer(&scene, full(Some(usual)));
+    assert_eq!(part(&renderer), (false, "every block is resident: nothing to fill".into()));
+    assert_eq!(renderer.plan().bytes(), without.plan().bytes(), "it costs no byte");
+    assert_eq!(gpu.finish(&mut renderer, &frame).color, expected.color);
+    let (report, plain) = (renderer.poll_report(), without.poll_report());
+    assert_eq!((report.bytes, report.dispatches), (plain.bytes, plain.dispatches));
+
+    // It comes with a cache, with foveated frames and where it is asked for all the same, and goes again.
+    let asked = InfillOptions { when: InfillWhen::Always, ..usual };
+    let foveated = RendererOptions { foveation: Some(BlueNoise::tiles()), ..full(Some(usual)) };
+    for with in [full(Some(asked)), foveated] {
+        renderer.set_options(&gpu.device, with).unwrap();
+        assert!(part(&renderer).0 && renderer.plan().bytes() > without.plan().bytes());
+        assert_eq!(gpu.finish(&mut renderer, &frame).color, expected.color);
+        renderer.set_options(&gpu.device, full(Some(usual))).unwrap();
+        assert!(!part(&renderer).0);
+        assert_eq!(gpu.finish(&mut renderer, &frame).color, expected.color);
+    }
+    let cached = RendererOptions { residency: Residency::Cached, ..full(Some(usual)) };
+    renderer.set_options(&gpu.device, cached).unwrap();
+    assert!(part(&renderer).0);
+    let report = render_until(&gpu, &mut renderer, &frame, 0.1);
+    assert!(!report.complete() && report.filled_pixels > 100, "{report:?}");
 }
 
 /// The finished picture, the rounds that it took and the blocks that were decoded.
