@@ -12,6 +12,7 @@ mod picture;
 #[allow(dead_code, reason = "shared with the example `stability`")]
 mod random;
 mod sequence;
+mod shapes;
 #[path = "../support/mod.rs"]
 mod support;
 
@@ -23,7 +24,7 @@ use sequence::{Sequence, Subject};
 use support::{Failure, Gpu};
 
 /// Kinds of volumes, in turn.
-const KINDS: [&str; 9] = [
+const KINDS: [&str; 11] = [
     "turbulence",
     "mixing-layer",
     "blobs",
@@ -33,6 +34,8 @@ const KINDS: [&str; 9] = [
     "gyroid",
     "rough-solid",
     "labels",
+    "rods",
+    "brain-part",
 ];
 
 /// Writes frames for training the in-fill network.

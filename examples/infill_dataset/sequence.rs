@@ -13,16 +13,20 @@ use progressive_iso::{
     PixelStatus, ProgressiveIsoRenderer, RendererOptions, Residency, Shading, TraversalStrategy,
 };
 use serde::Serialize;
+use volumes::Field;
 use wavefront::cpu::frame::{FrameRay, RayStates};
 use wavefront::cpu::shading::{self, dot};
 use wavefront::{FrameParams, LookAhead, ShadingParams};
 
 use crate::picture::{self, Pixel};
 use crate::random::Random;
+use crate::shapes::{BrainPart, Rods};
 use crate::support::{Failure, Gpu, read_words};
 
 /// Edges of the volumes in voxels.
 const EDGES: [u32; 5] = [96, 128, 160, 192, 224];
+/// Longest edge of a part of the bundled scan.
+const LARGEST_PART: u32 = 128;
 /// Bits per voxel of their streams.
 const RATE: f64 = 8.0;
 const FIELD_OF_VIEW_DEGREES: f64 = 50.0;
@@ -43,16 +47,25 @@ pub struct Subject {
 impl Subject {
     /// A volume of this kind of random size, seed and orientation.
     pub fn random(kind: &str, random: &mut Random) -> Self {
-        let dims = [EDGES[random.below(EDGES.len() as u32) as usize]; 3];
+        let most = if kind == "brain-part" { LARGEST_PART } else { u32::MAX };
+        let edge = EDGES[random.below(EDGES.len() as u32) as usize].min(most);
+        let dims = [edge; 3];
         let seed = random.below(1 << 30);
-        let rows = rotation(random);
-        let field = volumes::by_name_with_seed(kind, dims, seed).expect("a kind of the list");
-        let field = volumes::Rotated::new(field, dims, rows);
-        let zfp = volumes::generate(&field, dims, RATE).expect("a field that ZFP can hold");
+        let field: Box<dyn Field> = match kind {
+            "brain-part" => Box::new(BrainPart::random(edge, random)),
+            "rods" => Box::new(Rods::random(edge, random)),
+            _ => {
+                let rows = rotation(random);
+                let field =
+                    volumes::by_name_with_seed(kind, dims, seed).expect("a kind of the list");
+                Box::new(volumes::Rotated::new(field, dims, rows))
+            }
+        };
+        let zfp = volumes::generate(&*field, dims, RATE).expect("a field that ZFP can hold");
         let volume = CompressedVolume::try_from(&zfp).expect("a stream just made");
         let grid = Grid::new(dims);
         let ranges = macrocell::cpu::ranges::build(&grid, &zfp.decode());
-        let isovalue = volumes::Field::suggested_isovalue(&field) as f32;
+        let isovalue = field.suggested_isovalue() as f32;
         let field = CoarseField::new(&grid, &ranges);
         Self { kind: kind.into(), seed, volume, isovalue, field, grid }
     }

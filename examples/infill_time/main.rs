@@ -140,7 +140,7 @@ impl Orbit {
         let (center, radius) = self.renderer.volume().bounding_ball();
         let aspect = f64::from(self.size[0]) / f64::from(self.size[1]);
         let camera =
-            Camera::orbit(center, 0.75 * radius, 30.0 + f64::from(number), 20.0, 50.0, aspect);
+            Camera::orbit(center, 0.83 * radius, 30.0 + f64::from(number), 20.0, 50.0, aspect);
         let options = FrameOptions {
             rounds_per_pass: 1,
             pass_ms: f32::INFINITY,

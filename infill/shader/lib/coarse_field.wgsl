@@ -34,13 +34,26 @@ fn coarse_code(cell: u32, lane: u32) -> u32 {
     return (codes >> (16u * (lane & 1u))) & 0xffffu;
 }
 
-fn coarse_block(block: vec3<u32>) -> vec2<f32> {
-    let cell = macrocell_linear(vec3<i32>(block >> vec3<u32>(2u)), frame.grid.coarse);
+// A coarse cell and what turns its blocks' codes into values.
+struct CoarseCell {
+    index: u32,
+    low: f32,
+    step: f32,
+}
+
+fn coarse_cell(index: u32) -> CoarseCell {
+    let range = coarse_ranges[index];
+    return CoarseCell(index, range.x, 1.0 / macrocell_scale(range.x, range.y));
+}
+
+fn coarse_cell_of(block: vec3<u32>) -> u32 {
+    return macrocell_linear(vec3<i32>(block >> vec3<u32>(2u)), frame.grid.coarse);
+}
+
+fn coarse_block(block: vec3<u32>, cell: CoarseCell) -> vec2<f32> {
     let place = block & vec3<u32>(3u);
-    let code = coarse_code(cell, place.x | (place.y << 2u) | (place.z << 4u));
-    let range = coarse_ranges[cell];
-    let step = 1.0 / macrocell_scale(range.x, range.y);
-    return range.x + (vec2<f32>(vec2<u32>(code & 255u, code >> 8u)) + vec2<f32>(0.5)) * step;
+    let code = coarse_code(cell.index, place.x | (place.y << 2u) | (place.z << 4u));
+    return cell.low + (vec2<f32>(vec2<u32>(code & 255u, code >> 8u)) + vec2<f32>(0.5)) * cell.step;
 }
 
 fn coarse_at(position: vec3<f32>) -> CoarseSample {
@@ -49,9 +62,16 @@ fn coarse_at(position: vec3<f32>) -> CoarseSample {
     let first = vec3<u32>(q);
     let share = q - vec3<f32>(first);
     var sample = CoarseSample(vec2<f32>(0.0), vec3<f32>(0.0), vec3<f32>(0.0));
+    var cell = coarse_cell(coarse_cell_of(first));
     for (var corner = 0u; corner < 8u; corner++) {
         let upper = vec3<u32>(corner & 1u, (corner >> 1u) & 1u, corner >> 2u);
-        let ends = coarse_block(min(first + upper, last));
+        let block = min(first + upper, last);
+        // Most corners lie in one coarse cell.
+        let index = coarse_cell_of(block);
+        if (index != cell.index) {
+            cell = coarse_cell(index);
+        }
+        let ends = coarse_block(block, cell);
         let w = select(vec3<f32>(1.0) - share, share, upper == vec3<u32>(1u));
         let s = select(vec3<f32>(-1.0), vec3<f32>(1.0), upper == vec3<u32>(1u)) / COARSE_SPACING;
         let slopes = vec3<f32>(s.x * w.y * w.z, w.x * s.y * w.z, w.x * w.y * s.z);
