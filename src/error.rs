@@ -65,6 +65,15 @@ pub enum Error {
     /// [`crate::RendererOptions::foveation`] was not set.
     #[error("foveation was not planned: set RendererOptions::foveation")]
     FoveationNotPlanned,
+    /// [`crate::RendererOptions::budget`] was not set.
+    #[error("a frame-time budget was not planned: set RendererOptions::budget")]
+    BudgetNotPlanned,
+    /// [`crate::FrameOptions::target_ms`] is no time.
+    #[error("the target of a frame's time is {found} ms; expected a finite number above 0")]
+    Target {
+        /// What was given.
+        found: f32,
+    },
     /// No frame has been set.
     #[error("no frame has been set")]
     NoFrame,

@@ -3,6 +3,7 @@
 mod arriving;
 #[cfg(not(target_arch = "wasm32"))]
 mod blocking;
+mod budget;
 mod capture;
 mod error;
 mod faults;
@@ -20,6 +21,7 @@ mod timing;
 mod volume;
 
 pub use arriving::StreamFeed;
+pub use budget::BudgetMode;
 pub use capture::{Capture, PendingCapture};
 pub use error::Error;
 pub use gpu_primitives::memory::Category;

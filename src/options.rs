@@ -3,7 +3,7 @@
 use infill::{Sources, Weights};
 use wavefront::{BlueNoise, Camera, DrawTarget, Foveation, Outputs, Shading};
 
-use crate::Error;
+use crate::{BudgetMode, Error};
 
 /// How rays find the surface. All strategies make the same picture, bit for bit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -36,7 +36,7 @@ pub enum Residency {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum InfillWhen {
-    /// Not where the whole volume is resident and no frame is foveated: every ray ends in a frame's first pass
+    /// Not where the whole volume is resident and frames are neither foveated nor held to a time: every ray ends in a frame's first pass
     /// there, unless a dispatch would take long, so there is nothing to fill. [`crate::ScenePlan`] leaves it out, frames
     /// may ask for it all the same, and unfinished pixels show [`Shading::unfinished`].
     #[default]
@@ -90,6 +90,8 @@ pub struct RendererOptions {
     pub infill: Option<InfillOptions>,
     /// What [`FrameOptions::foveation`] needs: [`BlueNoise::tiles`]. `None`: every pass works on all rays.
     pub foveation: Option<&'static BlueNoise>,
+    /// What [`FrameOptions::target_ms`] needs: how settings follow from it. `None`: frames take as long as they do.
+    pub budget: Option<BudgetMode>,
     /// Whether pictures will be read back with [`crate::ProgressiveIsoRenderer::capture`].
     pub capture: bool,
     /// How rays find the surface.
@@ -111,6 +113,7 @@ impl Default for RendererOptions {
             draw_target: None,
             infill: None,
             foveation: None,
+            budget: None,
             capture: false,
             strategy: TraversalStrategy::RunAhead,
             residency: Residency::Auto,
@@ -129,8 +132,13 @@ impl RendererOptions {
     /// What fills unfinished pixels where the whole volume is resident, or where it is not.
     pub(crate) fn infill_in(&self, resident: bool) -> Option<InfillOptions> {
         self.infill.filter(|infill| {
-            infill.when == InfillWhen::Always || !resident || self.foveation.is_some()
+            infill.when == InfillWhen::Always || !resident || self.blue_noise().is_some()
         })
+    }
+
+    /// What sampling masks are made from, if any are.
+    pub(crate) fn blue_noise(&self) -> Option<&'static BlueNoise> {
+        self.foveation.or_else(|| self.budget.map(|_| BlueNoise::tiles()))
     }
 
     /// Whether a frame may be filled, guided and foveated as it asks.
@@ -144,6 +152,13 @@ impl RendererOptions {
         let guided = !frame.guided || infill.is_some_and(|infill| infill.guided);
         if !(filled && guided) {
             return Err(Error::InfillNotPlanned);
+        }
+        match frame.target_ms {
+            Some(_) if self.budget.is_none() => return Err(Error::BudgetNotPlanned),
+            Some(found) if !(found.is_finite() && found > 0.0) => {
+                return Err(Error::Target { found });
+            }
+            _ => {}
         }
         match frame.foveation {
             Some(_) if self.foveation.is_none() => Err(Error::FoveationNotPlanned),
@@ -194,6 +209,11 @@ pub struct FrameOptions {
     /// they show and are filled as those are, and count in [`crate::PassReport::active_rays`];
     /// [`crate::PassReport::sampled_rays`] counts the mask's. Needs [`RendererOptions::foveation`].
     pub foveation: Option<Foveation>,
+    /// Milliseconds that the frame's first pass should take. Its time is predicted, and it casts as large a share of the
+    /// rays, spread evenly over the picture, as fits; the passes after it cast the others. Rays that were not
+    /// cast are unfinished, as with `foveation`, so they are filled as `infill` says. A caller's own `foveation` is left
+    /// alone: such frames are not adapted. Needs [`RendererOptions::budget`].
+    pub target_ms: Option<f32>,
     /// Completeness that is enough: from then on reports are [`crate::PassReport::stopped`] and pixels are filled,
     /// not before. Passes that are called for all the same go on. `None`: pixels are filled after every pass.
     pub stop_at: Option<Completeness>,
@@ -210,6 +230,7 @@ impl Default for FrameOptions {
             crisp_infill: false,
             guided: false,
             foveation: None,
+            target_ms: None,
             stop_at: None,
         }
     }

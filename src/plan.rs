@@ -10,6 +10,7 @@ use macrocell::{MacrocellPlan, Masks, RangeScratch};
 use wavefront::{DrawBuffers, WavefrontPlan};
 use zfp_gpu::{DecodeBuffers, ExtremaBuffers, PayloadPlan, StreamLayout};
 
+use crate::budget::Budget;
 use crate::load::{BLOCKS_PER_REGION, LoadPlan};
 use crate::records::{CONTROL_BYTES, PASSES_IN_FLIGHT, readback_bytes};
 use crate::samples::SamplePlan;
@@ -254,7 +255,7 @@ impl<'a> Scene<'a> {
         let infill_options = options.infill_in(resident);
         let outputs = options.all_outputs(infill_options.is_some());
         let wavefront =
-            WavefrontPlan::new(options.size, outputs, limits)?.with_foveation(options.foveation);
+            WavefrontPlan::new(options.size, outputs, limits)?.with_foveation(options.blue_noise());
         let strategy = StrategyPlan::new(options.strategy, wavefront.rays(), limits)?;
         let infill = infill_options
             .map(|infill| {
@@ -401,7 +402,7 @@ impl<'a> Scene<'a> {
         ]
     }
 
-    fn picture_parts(&self) -> [Part; 6] {
+    fn picture_parts(&self) -> [Part; 7] {
         let Self { options, wavefront, .. } = self;
         [
             Part::new("pictures", When::Always, wavefront.output_bytes(), picture_names(wavefront)),
@@ -432,6 +433,13 @@ impl<'a> Scene<'a> {
                     Part::new("foveation", When::Rendering, bytes, why)
                 }
                 None => Part::left_out("foveation", "not asked for"),
+            },
+            match options.budget {
+                Some(_) => {
+                    let bytes = Budget::bytes(self.macrocell.grid());
+                    Part::new("frame budget", When::Rendering, bytes, "ranges read back once")
+                }
+                None => Part::left_out("frame budget", "not asked for"),
             },
         ]
     }

@@ -6,9 +6,10 @@ use gpu_primitives::readback::{Lost, ReadbackRing};
 use wavefront::Statistics;
 use web_time::Instant;
 
+use crate::budget::{Budget, Choice};
 use crate::schedule::Schedule;
 use crate::timing::Timer;
-use crate::{PassReport, wgpu};
+use crate::{BudgetMode, PassReport, Residency, ScenePlan, wgpu};
 
 /// Passes that may be in flight.
 pub(crate) const PASSES_IN_FLIGHT: usize = 2;
@@ -60,6 +61,8 @@ pub(crate) struct PassInfo {
     pub(crate) pixels: u32,
     /// Whether only the rays of a sampling mask are cast.
     pub(crate) foveated: bool,
+    /// What its setting was chosen by.
+    pub(crate) choice: Option<Choice>,
     /// Cells that its walks may visit each, and the time that the pass should take.
     pub(crate) most_cells: u32,
     pub(crate) pass_ms: f32,
@@ -91,6 +94,7 @@ pub(crate) struct PassRecords {
     profile: crate::timing::Profile,
     submitted: Vec<Submitted>,
     pub(crate) schedule: Schedule,
+    pub(crate) budget: Option<Budget>,
     last_report_at: Instant,
     pub(crate) report: PassReport,
     lost: Option<Lost>,
@@ -114,6 +118,7 @@ impl PassRecords {
             profile: crate::timing::Profile::new(device, queue, ledger),
             submitted: Vec::new(),
             schedule: Schedule::default(),
+            budget: None,
             last_report_at: Instant::now(),
             report: PassReport::default(),
             lost: None,
@@ -124,6 +129,21 @@ impl PassRecords {
     /// Reads back what in-fill has to tell, too, or no longer.
     pub(crate) fn set_infill(&mut self, infill: bool) {
         self.readback.set_bytes(readback_bytes(infill));
+    }
+
+    /// Holds frames to a time, or no longer; what was learned stays while the mode and the kind of residency do.
+    pub(crate) fn set_budget(
+        &mut self,
+        mode: Option<BudgetMode>,
+        ledger: &Ledger,
+        plan: &ScenePlan,
+    ) {
+        let cached = plan.residency() == Residency::Cached;
+        let kind = mode.map(|mode| (mode, cached));
+        if self.budget.as_ref().map(Budget::kind) != kind {
+            let grid = plan.macrocell.grid();
+            self.budget = mode.map(|mode| Budget::new(mode, ledger, grid, cached));
+        }
     }
 
     /// What became of a pass that cannot be made up for, if there was one.
@@ -185,6 +205,9 @@ impl PassRecords {
 
     /// Takes in what the GPU has finished.
     pub(crate) fn collect(&mut self) {
+        if let Some(budget) = &mut self.budget {
+            budget.collect();
+        }
         while let Some((tag, bytes)) = self.readback.take() {
             let Some(position) = self.submitted.iter().position(|s| s.tag == tag) else {
                 continue;
@@ -233,6 +256,9 @@ impl PassRecords {
         let elapsed = now.duration_since(info.begin.max(self.last_report_at));
         self.last_report_at = now;
         let ms = gpu_ms.unwrap_or(1e3 * elapsed.as_secs_f64());
+        if let (Some(budget), Some(choice), 1) = (&mut self.budget, &info.choice, info.pass) {
+            budget.learn(choice, ms);
+        }
         let same_frame = self.report.frame == info.frame;
         let rounds_before = if same_frame { self.report.rounds } else { 0 };
         let cut_before = if same_frame { self.report.cut_walks } else { 0 };
@@ -256,6 +282,9 @@ impl PassRecords {
         report.dispatches = info.dispatches;
         report.cpu_ms = info.cpu_ms;
         report.gpu_ms = gpu_ms;
+        report.density = info.choice.map_or(1.0, |choice| choice.density as f32);
+        report.predicted_ms = info.choice.and_then(|choice| choice.predicted_ms);
+        report.budget_ms = info.choice.map_or(0.0, |choice| choice.cpu_ms);
         report.rays = info.pixels;
         report.sampled_rays = if info.foveated { record.rays.sampled } else { info.pixels };
         report.entered_rays = record.rays.entered;

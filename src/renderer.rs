@@ -8,9 +8,10 @@ use gpu_primitives::kernel::dispatches_recorded;
 use gpu_primitives::memory::{Category, Ledger};
 use gpu_primitives::upload::UploadRing;
 use infill::Method;
-use wavefront::{FrameView, LookAhead, OutputTextures, SamplingParams, ShadingParams};
+use wavefront::{Foveation, FrameView, LookAhead, OutputTextures, SamplingParams, ShadingParams};
 use web_time::Instant;
 
+use crate::budget::{Choice, Request};
 use crate::capture::PendingCapture;
 use crate::faults::{Faults, Scopes, Task, is_lost};
 use crate::load::{LoadStages, Loader};
@@ -84,19 +85,23 @@ struct FrameState {
     most_cells: u32,
     passes: u32,
     rounds: u32,
+    /// Which rays its passes may cast; `None`: all.
+    foveation: Option<Foveation>,
+    /// What its setting was chosen by, if it is held to a time.
+    choice: Option<Choice>,
 }
 
 impl FrameState {
     /// What the next pass adds to the sampling mask of a foveated frame, if anything.
     fn sampling(&self, size: [u32; 2]) -> Option<SamplingParams> {
-        let foveation = self.frame.options.foveation?;
+        let foveation = self.foveation?;
         let adds = self.passes < foveation.passes;
         adds.then(|| SamplingParams::new(&foveation, size, self.number, self.passes))
     }
 
     /// Lists of rays made before the first rounds of the passes after the first, so far.
     fn lists_between(&self) -> u32 {
-        let passes = self.frame.options.foveation.map_or(1, |foveation| foveation.passes);
+        let passes = self.foveation.map_or(1, |foveation| foveation.passes);
         self.passes.clamp(1, passes) - 1
     }
 }
@@ -127,12 +132,13 @@ impl ProgressiveIsoRenderer {
         })?;
         let infill = plan.infill.is_some();
         let upload = UploadRing::new(&ledger, "progressive-iso.upload", PARAMS_CHUNK);
-        let (buffers, pictures, loader, records) = faults.guard(device, Task::Other, || {
+        let (buffers, pictures, loader, mut records) = faults.guard(device, Task::Other, || {
             let buffers = VolumeBuffers::new(device, &ledger, &stages, &plan);
             let pictures = Pictures::new(device, &ledger, &stages, &plan);
             let loader = Loader::new(device, &ledger, &plan, &buffers, load_stages)?;
             Ok((buffers, pictures, loader, PassRecords::new(device, queue, &ledger, infill)))
         })?;
+        records.set_budget(options.budget, &ledger, &plan);
         Ok(Self {
             faults,
             volume,
@@ -178,6 +184,8 @@ impl ProgressiveIsoRenderer {
             most_cells: 0,
             passes: 0,
             rounds: 0,
+            foveation: frame.options.foveation,
+            choice: None,
         });
         self.records.report.newest_frame = self.frame_count;
         Ok(())
@@ -300,6 +308,9 @@ impl ProgressiveIsoRenderer {
         self.records.record_begin(encoder);
         self.record_load(device, encoder)?;
         self.record_frame(device, encoder);
+        if let (Phase::Rendering(_), Some(budget)) = (&self.phase, &mut self.records.budget) {
+            budget.record_ranges(device, encoder, &self.buffers.ranges);
+        }
         self.records.record_end(encoder);
         let dispatches = dispatches_recorded().wrapping_sub(dispatches) as u32;
         self.record_readback(device, encoder, begin, dispatches);
@@ -365,6 +376,13 @@ impl ProgressiveIsoRenderer {
         let (Phase::Rendering(rendering), Some(state)) = (&self.phase, &mut self.frame) else {
             return;
         };
+        if let (Some(budget), Some(choice), Some(foveation), 1) =
+            (&self.records.budget, &state.choice, &mut state.foveation, state.passes)
+            && let Some(density) = budget.second(choice)
+        {
+            // The mask of the second pass has 1 - (1 - d)^2 of the rays.
+            foveation.base_density = 1.0 - (1.0 - density as f32).sqrt();
+        }
         if state.passes > 0
             && let Some(sampling) = state.sampling(self.options.size)
         {
@@ -373,7 +391,8 @@ impl ProgressiveIsoRenderer {
         }
         state.passes += 1;
         let options = &state.frame.options;
-        for _ in 0..self.records.schedule.rounds(options.rounds_per_pass, options.pass_ms) {
+        let pass_ms = options.pass_ms.min(options.target_ms.unwrap_or(f32::INFINITY));
+        for _ in 0..self.records.schedule.rounds(options.rounds_per_pass, pass_ms) {
             state.rounds += 1;
             let _span =
                 tracing::debug_span!("progressive_iso.round", round = state.rounds).entered();
@@ -425,11 +444,37 @@ impl ProgressiveIsoRenderer {
             rendering.record_infill_start(device, encoder, upload, stages, next, follows, look);
         }
         self.shown_isovalue = Some(isovalue);
+        Self::choose_rays(&mut self.records, &self.options, state, clear);
         let sampling = state.sampling(self.options.size);
         let sampling = sampling.as_ref();
         rendering.record_start(device, encoder, upload, stages, &params, &shading, sampling);
         if let (Some(draw), Some(buffers)) = (&stages.draw, &self.pictures.draw) {
             draw.record_params(device, encoder, upload, buffers, &state.view);
+        }
+    }
+
+    /// Chooses how many of a frame's rays its first pass casts, if the frame is held to a time.
+    fn choose_rays(
+        records: &mut PassRecords,
+        options: &RendererOptions,
+        state: &mut FrameState,
+        clear: bool,
+    ) {
+        let frame = &state.frame;
+        (state.foveation, state.choice) = (frame.options.foveation, None);
+        let Some(budget) = &mut records.budget else { return };
+        if clear {
+            budget.forget_cache();
+        }
+        if let (Some(target_ms), None) = (frame.options.target_ms, frame.options.foveation) {
+            let choice = budget.choose(&Request {
+                view: &state.view,
+                size: options.size,
+                isovalue: frame.isovalues[0],
+                look_ahead: frame.options.look_ahead,
+                target_ms: target_ms.into(),
+            });
+            (state.foveation, state.choice) = (choice.foveation(), Some(choice));
         }
     }
 
@@ -454,7 +499,8 @@ impl ProgressiveIsoRenderer {
         let stop_at = state.and_then(|state| state.frame.options.stop_at).map(|stop| stop.0);
         let fills = state.is_some_and(|state| state.frame.options.infill != Infill::Off);
         let lists_at_start = lists_at_start + state.map_or(0, FrameState::lists_between);
-        let foveated = state.is_some_and(|state| state.frame.options.foveation.is_some());
+        let foveated = state.is_some_and(|state| state.foveation.is_some());
+        let choice = state.and_then(|state| state.choice);
         let [width, height] = self.options.size;
         let cpu_ms = begin.elapsed().as_secs_f64() * 1e3;
         let pixels = width * height;
@@ -465,6 +511,7 @@ impl ProgressiveIsoRenderer {
             lists_at_start,
             pixels,
             foveated,
+            choice,
             most_cells,
             pass_ms,
             stop_at,

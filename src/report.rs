@@ -24,6 +24,13 @@ pub struct PassReport {
     pub rays: u32,
     /// Pixels whose rays the frame has had cast so far: all, or those of the sampling mask of a foveated frame.
     pub sampled_rays: u32,
+    /// Share of the rays that the frame's first pass might cast: less than 1 where a frame is held to
+    /// [`crate::FrameOptions::target_ms`].
+    pub density: f32,
+    /// What the frame's first pass was predicted to take, in milliseconds, if it was.
+    pub predicted_ms: Option<f64>,
+    /// CPU time of the frame-time budget for this frame: pre-pass, prediction and learning, in milliseconds.
+    pub budget_ms: f64,
     /// Rays that enter the volume.
     pub entered_rays: u32,
     /// Rays that are not finished.

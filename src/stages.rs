@@ -68,7 +68,7 @@ impl Stages {
         Ok(Self {
             activate: Activate::new(device, plan.macrocell.grid().has_third_level()),
             samples: SampleStages::new(device, &plan.samples)?,
-            rays: match options.foveation {
+            rays: match options.blue_noise() {
                 Some(_) => Rays::with_foveation(device, plan.wavefront.outputs(), layout),
                 None => Rays::new(device, plan.wavefront.outputs(), layout),
             },

@@ -90,7 +90,7 @@ impl Set {
 
     fn frames(self) -> u32 {
         match self {
-            Self::Default => 4,
+            Self::Default => 3,
             Self::Full => 16,
             Self::Test => 2,
         }

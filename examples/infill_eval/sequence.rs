@@ -96,20 +96,22 @@ impl Sequence {
             let old = before.take().filter(|_| !new_start);
             let is_last = frame + 1 == frames;
             let share = cuts[0].report.completeness_pixels();
-            for (i, made) in made.iter().enumerate() {
-                let previous = old.as_ref().map(|old| (&old[i], &old[old.len() - 1]));
-                let shown = (&made.shown, &truth, &holes[..]);
-                let cost = (made.ms, made.bytes);
-                measured.push(Frame::new(
-                    made.method,
-                    shown,
-                    previous,
-                    self.size,
-                    cost,
-                    is_last,
-                    share,
-                ));
-            }
+            let size = self.size;
+            // The measures take longer than the pictures.
+            measured.extend(
+                std::thread::scope(|scope| {
+                    let of = |(i, made): (usize, &Made)| {
+                        let previous = old.as_ref().map(|old| (&old[i], &old[old.len() - 1]));
+                        let shown = (&made.shown, &truth, &holes[..]);
+                        let cost = (made.ms, made.bytes);
+                        Frame::new(made.method, shown, previous, size, cost, is_last, share)
+                    };
+                    let threads: Vec<_> =
+                        made.iter().enumerate().map(|made| scope.spawn(move || of(made))).collect();
+                    threads.into_iter().map(|thread| thread.join()).collect::<Result<Vec<_>, _>>()
+                })
+                .map_err(|_| "a measure failed")?,
+            );
             if is_last {
                 let name = format!("{}-{}-{}-{cut}", subject.name, motion.name(), motion.degrees());
                 self.write(out, &name, &made, &truth)?;

@@ -39,7 +39,7 @@ impl ProgressiveIsoRenderer {
         let (layout, strategy) = (plan.samples.layout(), plan.strategy);
         if pictures
             || plan.infill_options != self.plan.infill_options
-            || options.foveation != self.options.foveation
+            || options.blue_noise() != self.options.blue_noise()
             || (layout, strategy) != (self.plan.samples.layout(), self.plan.strategy)
         {
             self.stages = self
@@ -55,6 +55,7 @@ impl ProgressiveIsoRenderer {
             })?;
         }
         self.records.set_infill(plan.infill.is_some());
+        self.records.set_budget(options.budget, &self.ledger, &plan);
         self.options = options;
         self.plan = plan;
         if let Some(state) = self.frame.take() {

@@ -12,6 +12,7 @@ mod draw;
 mod errors;
 mod faults;
 mod foveation;
+mod frame_budget;
 mod infill;
 mod invariance;
 mod left_out;

@@ -1,0 +1,396 @@
+//! The frame-time budget: how many rays a frame's first pass casts, so that it takes no longer than it should.
+//!
+//! A frame's time is predicted as its work, which a pre-pass estimates, times a cost per unit of work, which is learned
+//! while frames are rendered (V. Bruder, S. Frey, T. Ertl, Real-Time Performance Prediction and Tuning for Interactive
+//! Volume Raycasting, 2016).
+
+mod krls;
+mod work;
+
+use gpu_primitives::memory::Ledger;
+use gpu_primitives::readback::ReadbackRing;
+use macrocell::{Grid, RangeBuffers};
+use wavefront::{Foveation, FrameView};
+use web_time::Instant;
+
+use krls::Krls;
+use work::{PrePass, Work};
+
+use crate::wgpu;
+
+/// How a frame's setting follows from [`crate::FrameOptions::target_ms`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum BudgetMode {
+    /// From what a model predicts. It learns while frames are rendered; what it has not seen yet gets a safe setting.
+    #[default]
+    Predicted,
+    /// Not at all: every frame casts all rays. Times are predicted for the reports only.
+    Fixed,
+    /// From what the frame before took.
+    LastFrame,
+    /// From what the frame's own first pass takes, which casts a quarter of the rays of the frame before; the second pass
+    /// casts what fits.
+    TwoPass,
+}
+
+/// Number of features.
+const FEATURES: usize = 10;
+/// Share of the rays that are cast at least.
+const LEAST_DENSITY: f64 = 1.0 / 64.0;
+/// Share of the rays of the first frame, of which nothing is known.
+const FIRST_DENSITY: f64 = 1.0 / 16.0;
+/// From frame to frame the step between rays shrinks by this factor at most (the publication's limit).
+const MOST_STEP: f64 = 0.8;
+/// Part of the target that a prediction may take: times scatter.
+const MARGIN: f64 = 0.92;
+/// What a prediction about something entirely new is multiplied by, less 1.
+const CAUTION: f64 = 1.0;
+/// Halvings of the interval of densities in search of the largest that fits.
+const HALVINGS: u32 = 10;
+/// Unusable times in a row after which the clock counts as broken.
+const MOST_UNUSABLE: u32 = 3;
+/// Work of starting a pixel's ray, and of decoding a coarse cell, in visits of a block.
+const START_WORK: f64 = 0.1;
+const DECODE_WORK: f64 = 2000.0;
+
+/// A frame that a setting is wanted for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Request<'a> {
+    pub(crate) view: &'a FrameView,
+    pub(crate) size: [u32; 2],
+    pub(crate) isovalue: f32,
+    pub(crate) look_ahead: u32,
+    pub(crate) target_ms: f64,
+}
+
+/// What a frame's setting was chosen by, to learn from its time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Choice {
+    features: [f64; FEATURES],
+    /// 0 without a pre-pass.
+    work: f64,
+    /// Share of the rays that the frame's first pass may cast.
+    pub(crate) density: f64,
+    pub(crate) predicted_ms: Option<f64>,
+    pub(crate) target_ms: f64,
+    /// CPU time of pre-pass and prediction and of learning from the frame before.
+    pub(crate) cpu_ms: f64,
+}
+
+impl Choice {
+    /// The sampling mask of the frame's passes; `None`: all rays at once.
+    pub(crate) fn foveation(&self) -> Option<Foveation> {
+        // So that the passes after the first, which cast what is left, are about as long.
+        let passes = (2.0 / self.density).ceil() as u32;
+        (self.density < 1.0).then_some(Foveation {
+            sigma: 0.0,
+            base_density: self.density as f32,
+            passes: passes.clamp(1, Foveation::MOST_PASSES),
+            ..Foveation::default()
+        })
+    }
+}
+
+/// Chooses settings and learns from times.
+#[derive(Debug)]
+pub(crate) struct Budget {
+    mode: BudgetMode,
+    grid: Grid,
+    /// Whether blocks are decoded on demand.
+    cached: bool,
+    ranges: ReadbackRing,
+    pre_pass: Option<PrePass>,
+    model: Krls<FEATURES>,
+    /// Logarithm of the milliseconds per unit of work of the first frame that was measured.
+    level: Option<f64>,
+    /// Density and time of the newest frame that was measured, and the density that was chosen last.
+    last: Option<(f64, f64)>,
+    density: f64,
+    unusable: u32,
+    learning_ms: f64,
+}
+
+impl Budget {
+    pub(crate) fn new(mode: BudgetMode, ledger: &Ledger, grid: Grid, cached: bool) -> Self {
+        let ranges = ReadbackRing::new(ledger, "progressive-iso.budget", range_bytes(grid), 1);
+        Self {
+            mode,
+            grid,
+            cached,
+            ranges,
+            pre_pass: None,
+            model: Krls::default(),
+            level: None,
+            last: None,
+            density: FIRST_DENSITY,
+            unusable: 0,
+            learning_ms: 0.0,
+        }
+    }
+
+    /// Most bytes of GPU memory.
+    pub(crate) fn bytes(grid: Grid) -> u64 {
+        ReadbackRing::new(&Ledger::new(), "plan", range_bytes(grid), 1).bytes_limit()
+    }
+
+    /// The mode and whether blocks are decoded on demand.
+    pub(crate) fn kind(&self) -> (BudgetMode, bool) {
+        (self.mode, self.cached)
+    }
+
+    /// Records reading back the coarse cells' ranges, unless they are known or on their way.
+    pub(crate) fn record_ranges(
+        &mut self,
+        device: &wgpu::Device,
+        encoder: &mut wgpu::CommandEncoder,
+        ranges: &RangeBuffers,
+    ) {
+        if self.pre_pass.is_none() && self.ranges.has_room() {
+            let part = (ranges.coarse_ranges(), 0, range_bytes(self.grid));
+            self.ranges.record(device, encoder, &[part], 0);
+        }
+    }
+
+    /// Takes in the ranges, if the GPU has finished copying them. Lost ones are asked for again.
+    pub(crate) fn collect(&mut self) {
+        if let Some((_, Ok(bytes))) = self.ranges.take() {
+            let pair = |b: &[u8]| {
+                let value = |i: usize| f32::from_le_bytes([b[i], b[i + 1], b[i + 2], b[i + 3]]);
+                [value(0), value(4)]
+            };
+            self.pre_pass =
+                Some(PrePass::new(self.grid, bytes.chunks_exact(8).map(pair).collect()));
+            // They come once, and its memory goes.
+            self.ranges.set_bytes(0);
+        }
+    }
+
+    /// Nothing is decoded any more.
+    pub(crate) fn forget_cache(&mut self) {
+        if let Some(pre_pass) = &mut self.pre_pass {
+            pre_pass.forget();
+        }
+    }
+
+    /// The setting of a frame.
+    pub(crate) fn choose(&mut self, request: &Request<'_>) -> Choice {
+        let begin = Instant::now();
+        let Request { view, size, isovalue, target_ms, .. } = *request;
+        let work = self.pre_pass.as_mut().map(|pre_pass| pre_pass.estimate(view, size, isovalue));
+        let density = match (self.mode, work) {
+            _ if self.unusable >= MOST_UNUSABLE => 1.0,
+            (BudgetMode::Fixed, _) => 1.0,
+            (BudgetMode::TwoPass, _) => (self.after_last(target_ms) / 4.0).max(LEAST_DENSITY),
+            (BudgetMode::Predicted, Some(work)) if self.level.is_some() => {
+                self.fitting(request, &work)
+            }
+            _ => self.after_last(target_ms),
+        };
+        self.density = density;
+        let (mut features, mut units, mut predicted_ms) = ([0.0; FEATURES], 0.0, None);
+        if let Some(work) = &work {
+            features = self.features(request, work, density);
+            units = self.units(request, work, density);
+            predicted_ms = self.predict(request, work, density).map(|(ms, _)| ms);
+        }
+        let cpu_ms = begin.elapsed().as_secs_f64() * 1e3 + self.learning_ms;
+        Choice { features, work: units, density, predicted_ms, target_ms, cpu_ms }
+    }
+
+    /// The density of a frame's second pass, for [`BudgetMode::TwoPass`], once the first one's time is known.
+    pub(crate) fn second(&self, choice: &Choice) -> Option<f64> {
+        let (density, ms) = self.last.filter(|_| self.mode == BudgetMode::TwoPass)?;
+        let fits = density * choice.target_ms / ms;
+        (density.to_bits() == choice.density.to_bits()).then(|| fits.clamp(density, 1.0))
+    }
+
+    /// Learns what a frame's first pass took.
+    pub(crate) fn learn(&mut self, choice: &Choice, ms: f64) {
+        if !(ms.is_finite() && ms > 0.0) {
+            self.unusable += 1;
+            return;
+        }
+        let begin = Instant::now();
+        self.unusable = 0;
+        self.last = Some((choice.density, ms));
+        if choice.work > 0.0 {
+            let cost = (ms / choice.work).ln();
+            // What is new costs about as much as the first frame did.
+            let level = *self.level.get_or_insert(cost);
+            self.model.learn(&choice.features, cost - level);
+        }
+        self.learning_ms = begin.elapsed().as_secs_f64() * 1e3;
+    }
+
+    /// The density by what the last frame took; the safe one if there was none.
+    fn after_last(&self, target_ms: f64) -> f64 {
+        let Some((density, ms)) = self.last else { return FIRST_DENSITY };
+        (density * target_ms / ms).min(density / MOST_STEP).clamp(LEAST_DENSITY, 1.0)
+    }
+
+    /// The largest density that is predicted to fit.
+    fn fitting(&self, request: &Request<'_>, work: &Work) -> f64 {
+        let fits = |density: f64| {
+            let target_ms = MARGIN * request.target_ms;
+            self.predict(request, work, density)
+                .is_some_and(|(ms, novelty)| ms * (1.0 + CAUTION * novelty) <= target_ms)
+        };
+        let most = (self.density / MOST_STEP).clamp(LEAST_DENSITY, 1.0);
+        if fits(most) {
+            return most;
+        }
+        let (mut low, mut high) = (LEAST_DENSITY.ln(), most.ln());
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            if fits(middle.exp()) { low = middle } else { high = middle }
+        }
+        low.exp()
+    }
+
+    /// Milliseconds, and how new this is.
+    fn predict(&self, request: &Request<'_>, work: &Work, density: f64) -> Option<(f64, f64)> {
+        let level = self.level?;
+        let (cost, novelty) = self.model.predict(&self.features(request, work, density));
+        Some((self.units(request, work, density) * (level + cost).exp(), novelty))
+    }
+
+    /// Work in visits of a block.
+    fn units(&self, request: &Request<'_>, work: &Work, density: f64) -> f64 {
+        let rays = request.size.map(f64::from).iter().product::<f64>();
+        let decoded = if self.cached { work.fresh * work.in_sight * DECODE_WORK } else { 0.0 };
+        rays * (START_WORK + density * work.entered * (1.0 + work.visited))
+            + decoded * density.sqrt()
+    }
+
+    fn features(&self, request: &Request<'_>, work: &Work, density: f64) -> [f64; FEATURES] {
+        let Request { view, size, look_ahead, .. } = *request;
+        let middle = size.map(|s| s / 2);
+        let (_, direction, _) = view.ray(middle);
+        let (_, beside, _) = view.ray([middle[0] + 1, middle[1]]);
+        let apart = glam::DVec3::from(direction).distance(beside.into());
+        let voxels_per_pixel = (apart * work.distance_voxels).max(1e-3);
+        let rays = size.map(f64::from).iter().product::<f64>();
+        [
+            0.7 * density.ln(),
+            (1.0 + work.visited).ln(),
+            work.entered,
+            0.5 * (1.0 + work.depth_voxels).ln(),
+            if self.cached { 2.0 * work.fresh } else { 0.0 },
+            0.3 * f64::from(look_ahead.max(1)).ln(),
+            0.3 * voxels_per_pixel.ln(),
+            0.5 * rays.ln(),
+            0.4 * direction[0],
+            0.4 * direction[1],
+        ]
+    }
+}
+
+/// Bytes of all coarse cells' ranges.
+fn range_bytes(grid: Grid) -> u64 {
+    8 * grid.coarse_count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wavefront::Camera;
+
+    const SIZE: [u32; 2] = [640, 360];
+    const GRID: [u32; 3] = [200, 200, 200];
+
+    fn budget(mode: BudgetMode) -> Budget {
+        let grid = Grid::new(GRID);
+        let mut budget = Budget::new(mode, &Ledger::new(), grid, false);
+        // Active for isovalues from 0 to 1: a cell in three.
+        let active = |i: u64| if i % 3 == 0 { [0.0, 1.0] } else { [2.0, 3.0] };
+        let ranges = (0..grid.coarse_count()).map(active).collect();
+        budget.pre_pass = Some(PrePass::new(grid, ranges));
+        budget
+    }
+
+    fn view(azimuth: f64, distance: f64) -> FrameView {
+        let unit = [1.0, 0.0, 0.0, 0.0];
+        let world = [unit, [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+        let camera = Camera::orbit([100.0; 3], 170.0 * distance, azimuth, 20.0, 50.0, 16.0 / 9.0);
+        FrameView::new(&camera, SIZE, world, GRID).unwrap_or_else(|e| panic!("{e}"))
+    }
+
+    /// Shows `frames` frames of a moving camera to a renderer whose times are `cost` of density and
+    /// frame number, and returns densities and times.
+    fn show(
+        budget: &mut Budget,
+        frames: u32,
+        target_ms: f64,
+        cost: impl Fn(f64, u32) -> f64,
+    ) -> Vec<(f64, f64)> {
+        let frame = |number: u32| {
+            let distance = 0.8 + 0.3 * (f64::from(number) * 0.1).sin();
+            let view = view(3.0 * f64::from(number), distance);
+            let request =
+                Request { view: &view, size: SIZE, isovalue: 0.5, look_ahead: 2, target_ms };
+            let choice = budget.choose(&request);
+            let ms = cost(choice.density, number);
+            budget.learn(&choice, ms);
+            (choice.density, ms)
+        };
+        (0..frames).map(frame).collect()
+    }
+
+    #[test]
+    fn times_come_near_the_target_from_below() {
+        let cost = |density: f64, _| 4.0 + 90.0 * density;
+        let shown = show(&mut budget(BudgetMode::Predicted), 120, 30.0, cost);
+        for (i, (density, ms)) in shown.iter().enumerate().skip(20) {
+            assert!((22.0..31.0).contains(ms), "frame {i}: {ms} ms with a density of {density}");
+        }
+    }
+
+    #[test]
+    fn a_density_rises_by_a_quarter_at_most() {
+        for mode in [BudgetMode::Predicted, BudgetMode::LastFrame] {
+            let shown = show(&mut budget(mode), 60, 1e6, |density, _| 100.0 * density);
+            for pair in shown.windows(2) {
+                assert!(pair[1].0 <= pair[0].0 / MOST_STEP * (1.0 + 1e-9), "{mode:?}: {pair:?}");
+            }
+            assert_eq!(shown[59].0.to_bits(), 1.0_f64.to_bits(), "{mode:?}: all rays fit");
+        }
+    }
+
+    #[test]
+    fn what_does_not_fit_gets_the_least_density() {
+        for mode in [BudgetMode::Predicted, BudgetMode::LastFrame] {
+            let shown = show(&mut budget(mode), 30, 1e-3, |density, _| 100.0 * density);
+            assert!((shown[29].0 - LEAST_DENSITY).abs() < 1e-3, "{mode:?}: {:?}", shown[29]);
+        }
+    }
+
+    #[test]
+    fn an_unusable_clock_ends_adaptation_and_a_usable_one_resumes_it() {
+        for broken in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            let mut budget = budget(BudgetMode::Predicted);
+            let cost = |density: f64, number| {
+                if (10..20).contains(&number) { broken } else { 100.0 * density }
+            };
+            let shown = show(&mut budget, 40, 20.0, cost);
+            assert!(shown[9].0 < 0.5, "{shown:?}");
+            for (density, _) in &shown[13..20] {
+                assert_eq!(density.to_bits(), 1.0_f64.to_bits(), "{broken}: {shown:?}");
+            }
+            assert!(shown[39].0 < 0.5, "{broken}: {shown:?}");
+        }
+    }
+
+    #[test]
+    fn a_second_pass_casts_what_the_first_one_leaves_time_for() {
+        let mut budget = budget(BudgetMode::TwoPass);
+        let view = view(0.0, 1.0);
+        let request =
+            Request { view: &view, size: SIZE, isovalue: 0.5, look_ahead: 2, target_ms: 20.0 };
+        let choice = budget.choose(&request);
+        assert_eq!(budget.second(&choice), None, "nothing is known of it yet");
+        budget.learn(&choice, 5.0);
+        let second = budget.second(&choice);
+        assert!(second.is_some_and(|d| (d - 4.0 * choice.density).abs() < 1e-12), "{second:?}");
+    }
+}

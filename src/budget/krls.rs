@@ -1,0 +1,191 @@
+//! Kernel recursive least squares: regression from examples that arrive one by one (Y. Engel, S. Mannor, R. Meir, The Kernel
+//! Recursive Least-Squares Algorithm, 2004), with approximate linear dependence as the test for what is new, a
+//! bounded dictionary and forgetting.
+
+/// What an example must be off the span of the dictionary, as a square in feature space, to join it.
+const LEAST_NOVELTY: f64 = 0.02;
+/// Most examples in the dictionary; further ones change its weights only.
+const CAPACITY: usize = 64;
+/// Share of an old example's weight that stays with every new one.
+const MEMORY: f64 = 0.99;
+/// Added to the kernel's diagonal: noise of the examples.
+const NOISE: f64 = 1e-3;
+/// Variances do not grow beyond this while nothing is learned about a direction.
+const MOST_VARIANCE: f64 = 1e3;
+
+/// Predicts a number from `N` features, each scaled so that a difference of 1 is a large one.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Krls<const N: usize> {
+    dictionary: Vec<[f64; N]>,
+    /// Inverse of the dictionary's kernel matrix, row by row.
+    inverse: Vec<f64>,
+    /// Covariance of the weights, row by row.
+    covariance: Vec<f64>,
+    weights: Vec<f64>,
+}
+
+/// A Gaussian of width 1.
+fn kernel<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
+    let square: f64 = a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum();
+    (-0.5 * square).exp()
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// A symmetric matrix times a vector.
+fn times(matrix: &[f64], vector: &[f64]) -> Vec<f64> {
+    matrix.chunks_exact(vector.len().max(1)).map(|row| dot(row, vector)).collect()
+}
+
+/// The matrix with another row and column.
+fn grown(matrix: &[f64], size: usize, border: impl Fn(usize) -> f64, corner: f64) -> Vec<f64> {
+    let mut grown = Vec::with_capacity((size + 1) * (size + 1));
+    for row in 0..size {
+        grown.extend_from_slice(&matrix[row * size..(row + 1) * size]);
+        grown.push(border(row));
+    }
+    grown.extend((0..size).map(border));
+    grown.push(corner);
+    grown
+}
+
+impl<const N: usize> Krls<N> {
+    /// The expected number, and how new the features are: 0 where they are in the dictionary's span, 1 far away from all
+    /// that was learned.
+    pub(crate) fn predict(&self, features: &[f64; N]) -> (f64, f64) {
+        let k = self.kernels(features);
+        let novelty = 1.0 - dot(&k, &times(&self.inverse, &k));
+        (dot(&k, &self.weights), novelty.clamp(0.0, 1.0))
+    }
+
+    /// Learns that `features` go with `value`.
+    pub(crate) fn learn(&mut self, features: &[f64; N], value: f64) {
+        let k = self.kernels(features);
+        let a = times(&self.inverse, &k);
+        let novelty = 1.0 + NOISE - dot(&k, &a);
+        let error = value - dot(&k, &self.weights);
+        if novelty > LEAST_NOVELTY && self.dictionary.len() < CAPACITY {
+            self.join(features, &a, novelty, error);
+        } else {
+            self.correct(&a, error);
+        }
+    }
+
+    fn kernels(&self, features: &[f64; N]) -> Vec<f64> {
+        self.dictionary.iter().map(|known| kernel(known, features)).collect()
+    }
+
+    fn join(&mut self, features: &[f64; N], a: &[f64], novelty: f64, error: f64) {
+        let size = self.dictionary.len();
+        let mut inverse = self.inverse.clone();
+        for row in 0..size {
+            for column in 0..size {
+                inverse[row * size + column] += a[row] * a[column] / novelty;
+            }
+        }
+        self.inverse = grown(&inverse, size, |i| -a[i] / novelty, 1.0 / novelty);
+        self.covariance = grown(&self.covariance, size, |_| 0.0, 1.0);
+        for (weight, a) in self.weights.iter_mut().zip(a) {
+            *weight -= a * error / novelty;
+        }
+        self.weights.push(error / novelty);
+        self.dictionary.push(*features);
+    }
+
+    fn correct(&mut self, a: &[f64], error: f64) {
+        let size = a.len();
+        let pa = times(&self.covariance, a);
+        let divisor = MEMORY + dot(a, &pa);
+        let gain: Vec<f64> = pa.iter().map(|pa| pa / divisor).collect();
+        for row in 0..size {
+            for column in 0..size {
+                let entry = &mut self.covariance[row * size + column];
+                *entry -= gain[row] * pa[column];
+            }
+        }
+        let most = (0..size).map(|i| self.covariance[i * size + i]).fold(0.0, f64::max);
+        if most < MOST_VARIANCE {
+            self.covariance.iter_mut().for_each(|entry| *entry /= MEMORY);
+        }
+        for (weight, change) in self.weights.iter_mut().zip(times(&self.inverse, &gain)) {
+            *weight += change * error;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers from 0 to 1 that look random, the same in every run.
+    fn noise(seed: u64) -> impl FnMut() -> f64 {
+        let mut state = seed;
+        move || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        }
+    }
+
+    fn cost([x, y]: [f64; 2]) -> f64 {
+        (1.3 * x).sin() + 0.5 * y * y
+    }
+
+    #[test]
+    fn a_smooth_function_is_learned_from_noisy_examples() {
+        let (mut random, mut model) = (noise(1), Krls::<2>::default());
+        for _ in 0..2000 {
+            let place = [4.0 * random() - 2.0, 4.0 * random() - 2.0];
+            model.learn(&place, cost(place) + 0.05 * (random() - 0.5));
+        }
+        for _ in 0..200 {
+            let place = [3.0 * random() - 1.5, 3.0 * random() - 1.5];
+            let (found, novelty) = model.predict(&place);
+            assert!((found - cost(place)).abs() < 0.1, "{place:?}: {found} for {}", cost(place));
+            assert!(novelty < 0.1, "{place:?}: {novelty}");
+        }
+    }
+
+    #[test]
+    fn novelty_is_1_far_away_and_0_where_something_was_learned() {
+        let mut model = Krls::<2>::default();
+        assert_eq!(model.predict(&[0.0, 0.0]), (0.0, 1.0));
+        model.learn(&[0.0, 0.0], 3.0);
+        let (found, novelty) = model.predict(&[0.0, 0.0]);
+        assert!((found - 3.0).abs() < 0.01 && novelty < 0.01, "{found} {novelty}");
+        assert!(model.predict(&[9.0, 0.0]).1 > 0.999);
+    }
+
+    #[test]
+    fn the_dictionary_is_bounded_and_numbers_stay_finite() {
+        let (mut random, mut model) = (noise(2), Krls::<2>::default());
+        for i in 0..10_000 {
+            // Long stretches at one place, then a wide field.
+            let wide = if i % 1000 < 700 { 0.0 } else { 40.0 };
+            let place = [wide * random(), wide * random()];
+            model.learn(&place, cost(place.map(|v| v / 20.0)));
+            assert!(model.dictionary.len() <= CAPACITY);
+        }
+        let numbers = model.covariance.iter().chain(&model.inverse).chain(&model.weights);
+        for number in numbers {
+            assert!(number.abs() < 1e6, "{number}");
+        }
+        let (found, _) = model.predict(&[0.0, 0.0]);
+        assert!((found - cost([0.0, 0.0])).abs() < 0.1, "{found}");
+    }
+
+    #[test]
+    fn what_changes_is_learned_again() {
+        let mut model = Krls::<1>::default();
+        for _ in 0..100 {
+            model.learn(&[0.5], 1.0);
+        }
+        for _ in 0..300 {
+            model.learn(&[0.5], 2.0);
+        }
+        assert!((model.predict(&[0.5]).0 - 2.0).abs() < 0.2, "{:?}", model.predict(&[0.5]));
+    }
+}
