@@ -43,15 +43,16 @@ const FIRST_DENSITY: f64 = 1.0 / 16.0;
 /// From frame to frame the step between rays shrinks by this factor at most (the publication's limit).
 const MOST_STEP: f64 = 0.8;
 /// Part of the target that a prediction may take: times scatter.
-const MARGIN: f64 = 0.92;
+const MARGIN: f64 = 1.0;
 /// What a prediction about something entirely new is multiplied by, less 1.
-const CAUTION: f64 = 1.0;
-/// Halvings of the interval of densities in search of the largest that fits.
-const HALVINGS: u32 = 10;
+const CAUTION: f64 = 0.5;
+/// Densities between the most and the least that are looked at.
+const CANDIDATES: u32 = 24;
 /// Unusable times in a row after which the clock counts as broken.
 const MOST_UNUSABLE: u32 = 3;
-/// Work of starting a pixel's ray, and of decoding a coarse cell, in visits of a block.
+/// Work of starting a pixel's ray, of filling a pixel and of decoding a coarse cell, in visits of a block.
 const START_WORK: f64 = 0.1;
+const FILL_WORK: f64 = 4.0;
 const DECODE_WORK: f64 = 2000.0;
 
 /// A frame that a setting is wanted for.
@@ -61,6 +62,8 @@ pub(crate) struct Request<'a> {
     pub(crate) size: [u32; 2],
     pub(crate) isovalue: f32,
     pub(crate) look_ahead: u32,
+    /// Whether pixels without a cast ray are filled.
+    pub(crate) fills: bool,
     pub(crate) target_ms: f64,
 }
 
@@ -229,23 +232,23 @@ impl Budget {
         (density * target_ms / ms).min(density / MOST_STEP).clamp(LEAST_DENSITY, 1.0)
     }
 
-    /// The largest density that is predicted to fit.
+    /// The largest density that is predicted to fit, or else the one that is predicted to take least: fewer rays leave
+    /// more pixels to fill, so that time need not fall with them.
     fn fitting(&self, request: &Request<'_>, work: &Work) -> f64 {
-        let fits = |density: f64| {
-            let target_ms = MARGIN * request.target_ms;
-            self.predict(request, work, density)
-                .is_some_and(|(ms, novelty)| ms * (1.0 + CAUTION * novelty) <= target_ms)
-        };
         let most = (self.density / MOST_STEP).clamp(LEAST_DENSITY, 1.0);
-        if fits(most) {
-            return most;
+        let (mut best, mut least_ms) = (LEAST_DENSITY, f64::INFINITY);
+        for i in 0..=CANDIDATES {
+            let density = most * (LEAST_DENSITY / most).powf(f64::from(i) / f64::from(CANDIDATES));
+            let Some((ms, novelty)) = self.predict(request, work, density) else { break };
+            let ms = ms * (1.0 + CAUTION * novelty);
+            if ms <= MARGIN * request.target_ms {
+                return density;
+            }
+            if ms < least_ms {
+                (best, least_ms) = (density, ms);
+            }
         }
-        let (mut low, mut high) = (LEAST_DENSITY.ln(), most.ln());
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (low + high);
-            if fits(middle.exp()) { low = middle } else { high = middle }
-        }
-        low.exp()
+        best
     }
 
     /// Milliseconds, and how new this is.
@@ -258,9 +261,10 @@ impl Budget {
     /// Work in visits of a block.
     fn units(&self, request: &Request<'_>, work: &Work, density: f64) -> f64 {
         let rays = request.size.map(f64::from).iter().product::<f64>();
+        let filled = if request.fills { (1.0 - density) * work.entered * FILL_WORK } else { 0.0 };
+        let cast = density * work.entered * (1.0 + work.visited);
         let decoded = if self.cached { work.fresh * work.in_sight * DECODE_WORK } else { 0.0 };
-        rays * (START_WORK + density * work.entered * (1.0 + work.visited))
-            + decoded * density.sqrt()
+        rays * (START_WORK + cast + filled) + decoded * density.sqrt()
     }
 
     fn features(&self, request: &Request<'_>, work: &Work, density: f64) -> [f64; FEATURES] {
@@ -327,8 +331,14 @@ mod tests {
         let frame = |number: u32| {
             let distance = 0.8 + 0.3 * (f64::from(number) * 0.1).sin();
             let view = view(3.0 * f64::from(number), distance);
-            let request =
-                Request { view: &view, size: SIZE, isovalue: 0.5, look_ahead: 2, target_ms };
+            let request = Request {
+                view: &view,
+                size: SIZE,
+                isovalue: 0.5,
+                look_ahead: 2,
+                fills: false,
+                target_ms,
+            };
             let choice = budget.choose(&request);
             let ms = cost(choice.density, number);
             budget.learn(&choice, ms);
@@ -385,8 +395,14 @@ mod tests {
     fn a_second_pass_casts_what_the_first_one_leaves_time_for() {
         let mut budget = budget(BudgetMode::TwoPass);
         let view = view(0.0, 1.0);
-        let request =
-            Request { view: &view, size: SIZE, isovalue: 0.5, look_ahead: 2, target_ms: 20.0 };
+        let request = Request {
+            view: &view,
+            size: SIZE,
+            isovalue: 0.5,
+            look_ahead: 2,
+            fills: false,
+            target_ms: 20.0,
+        };
         let choice = budget.choose(&request);
         assert_eq!(budget.second(&choice), None, "nothing is known of it yet");
         budget.learn(&choice, 5.0);

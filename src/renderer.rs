@@ -472,6 +472,7 @@ impl ProgressiveIsoRenderer {
                 size: options.size,
                 isovalue: frame.isovalues[0],
                 look_ahead: frame.options.look_ahead,
+                fills: frame.options.infill != Infill::Off,
                 target_ms: target_ms.into(),
             });
             (state.foveation, state.choice) = (choice.foveation(), Some(choice));

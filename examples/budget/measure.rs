@@ -1,0 +1,203 @@
+//! The modes, frame by frame in turn.
+
+use std::time::Instant;
+
+use progressive_iso::{
+    BudgetMode, CompressedVolume, Frame, FrameOptions, Infill, InfillOptions, InfillSources,
+    ProgressiveIsoRenderer, RendererOptions,
+};
+use serde::Serialize;
+
+use crate::sequence::View;
+use crate::support::{Failure, Gpu, median};
+
+const BUDGET_BYTES: u64 = 1 << 30;
+/// Every so many frames' full times make the target.
+const EVERY: usize = 5;
+/// Frames after which predictions count.
+const LEARNING_FRAMES: usize = 20;
+
+pub const MODES: [(&str, BudgetMode); 4] = [
+    ("no adaptation", BudgetMode::Fixed),
+    ("last frame", BudgetMode::LastFrame),
+    ("two pass", BudgetMode::TwoPass),
+    ("predicted", BudgetMode::Predicted),
+];
+
+/// One frame in one mode.
+#[derive(Clone, Copy, Debug)]
+pub struct Shown {
+    pub ms: f64,
+    /// Finished share of the rays that enter the volume.
+    quality: f64,
+    predicted_ms: Option<f64>,
+    budget_ms: f64,
+}
+
+/// A mode on a recording.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    pub volume: String,
+    pub seconds: u32,
+    pub mode: &'static str,
+    pub target_ms: f64,
+    pub frames: usize,
+    /// Mean finished share of the rays that enter the volume.
+    pub quality: f64,
+    pub rmse_ms: f64,
+    /// Over the frames above and below the target.
+    pub rmse_above_ms: f64,
+    pub rmse_below_ms: f64,
+    pub largest_above_ms: f64,
+    pub largest_below_ms: f64,
+    /// Median relative error of predictions after the first 20 frames; null where nothing was predicted.
+    pub prediction_error: Option<f64>,
+    /// Pre-pass, prediction and learning: mean and most, CPU.
+    pub budget_ms: f64,
+    pub most_budget_ms: f64,
+}
+
+fn frame(
+    volume: &CompressedVolume,
+    view: &View,
+    isovalue: f32,
+    size: [u32; 2],
+    target_ms: f64,
+) -> Frame {
+    let options = FrameOptions {
+        target_ms: Some(target_ms as f32),
+        infill: Infill::Classical,
+        pass_ms: f32::INFINITY,
+        ..Default::default()
+    };
+    Frame {
+        camera: view.camera(volume, size),
+        isovalues: vec![isovalue * view.isovalue as f32],
+        options,
+    }
+}
+
+fn renderer(
+    gpu: &Gpu,
+    volume: &CompressedVolume,
+    size: [u32; 2],
+    mode: BudgetMode,
+) -> Result<ProgressiveIsoRenderer, Failure> {
+    let sources = InfillSources { neighbours: true, coarse_field: false, history: false };
+    let options = RendererOptions {
+        size,
+        budget_bytes: BUDGET_BYTES,
+        infill: Some(InfillOptions { sources, ..Default::default() }),
+        budget: Some(mode),
+        ..Default::default()
+    };
+    let mut renderer =
+        ProgressiveIsoRenderer::new(&gpu.device, &gpu.queue, volume.clone(), options)?;
+    let view = crate::sequence::record(1, 0)[0];
+    // Loads the volume and warms the driver.
+    for _ in 0..2 {
+        renderer.set_frame(&frame(volume, &view, 1e-3, size, 1e6))?;
+        renderer.render_to_completion(&gpu.device, &gpu.queue, |_, _| true)?;
+    }
+    Ok(renderer)
+}
+
+/// What is shown of a frame while a user interacts: its first pass, or two.
+fn show(
+    gpu: &Gpu,
+    renderer: &mut ProgressiveIsoRenderer,
+    frame: &Frame,
+    passes: u32,
+) -> Result<Shown, Failure> {
+    renderer.set_frame(frame)?;
+    let (mut ms, mut pass) = (0.0, 0);
+    let begin = Instant::now();
+    let report = renderer.render_to_completion(&gpu.device, &gpu.queue, |_, report| {
+        if report.pass != pass {
+            pass = report.pass;
+            // Without timestamps the last pass has the wall time of all.
+            ms = report.gpu_ms.map_or(begin.elapsed().as_secs_f64() * 1e3, |gpu_ms| ms + gpu_ms);
+        }
+        report.pass < passes
+    })?;
+    Ok(Shown {
+        ms,
+        quality: report.completeness(),
+        predicted_ms: report.predicted_ms,
+        budget_ms: report.budget_ms,
+    })
+}
+
+/// Shows a recording in all modes; the frames of each, and the target.
+pub fn run(
+    gpu: &Gpu,
+    volume: &CompressedVolume,
+    isovalue: f32,
+    views: &[View],
+    size: [u32; 2],
+    target_ms: Option<f64>,
+) -> Result<(Vec<Vec<Shown>>, f64), Failure> {
+    let mut renderers = MODES
+        .iter()
+        .map(|(_, mode)| renderer(gpu, volume, size, *mode))
+        .collect::<Result<Vec<_>, _>>()?;
+    let target_ms = match target_ms {
+        Some(target_ms) => target_ms,
+        None => {
+            let full = views.iter().step_by(EVERY).map(|view| {
+                let frame = frame(volume, view, isovalue, size, 1e6);
+                Ok(show(gpu, &mut renderers[0], &frame, 1)?.ms)
+            });
+            0.5 * median(full.collect::<Result<Vec<_>, Failure>>()?.into_iter())
+        }
+    };
+    let mut shown = vec![Vec::new(); MODES.len()];
+    for view in views {
+        let frame = frame(volume, view, isovalue, size, target_ms);
+        for ((renderer, shown), (_, mode)) in renderers.iter_mut().zip(&mut shown).zip(MODES) {
+            let passes = if mode == BudgetMode::TwoPass { 2 } else { 1 };
+            shown.push(show(gpu, renderer, &frame, passes)?);
+        }
+    }
+    Ok((shown, target_ms))
+}
+
+impl Row {
+    pub fn new(
+        volume: String,
+        seconds: u32,
+        mode: &'static str,
+        shown: &[Shown],
+        target_ms: f64,
+    ) -> Self {
+        let errors = || shown.iter().map(|shown| shown.ms - target_ms);
+        let rms = |errors: Vec<f64>| {
+            let count = errors.len().max(1) as f64;
+            (errors.iter().fold(0.0, |sum, error| sum + error * error) / count).sqrt()
+        };
+        let mean = |value: fn(&Shown) -> f64| {
+            shown.iter().map(value).sum::<f64>() / shown.len().max(1) as f64
+        };
+        let predictions: Vec<f64> = shown
+            .iter()
+            .skip(LEARNING_FRAMES)
+            .filter_map(|shown| Some((shown.predicted_ms? - shown.ms).abs() / shown.ms))
+            .collect();
+        Self {
+            volume,
+            seconds,
+            mode,
+            target_ms,
+            frames: shown.len(),
+            quality: mean(|shown| shown.quality),
+            rmse_ms: rms(errors().collect()),
+            rmse_above_ms: rms(errors().filter(|e| *e > 0.0).collect()),
+            rmse_below_ms: rms(errors().filter(|e| *e <= 0.0).collect()),
+            largest_above_ms: errors().fold(0.0, f64::max),
+            largest_below_ms: errors().fold(0.0, f64::min).abs(),
+            prediction_error: (!predictions.is_empty()).then(|| median(predictions.into_iter())),
+            budget_ms: mean(|shown| shown.budget_ms),
+            most_budget_ms: shown.iter().map(|shown| shown.budget_ms).fold(0.0, f64::max),
+        }
+    }
+}
