@@ -110,16 +110,18 @@ fn show(
     passes: u32,
 ) -> Result<Shown, Failure> {
     renderer.set_frame(frame)?;
-    let (mut ms, mut pass) = (0.0, 0);
-    let begin = Instant::now();
-    let report = renderer.render_to_completion(&gpu.device, &gpu.queue, |_, report| {
-        if report.pass != pass {
-            pass = report.pass;
-            // Without timestamps the last pass has the wall time of all.
-            ms = report.gpu_ms.map_or(begin.elapsed().as_secs_f64() * 1e3, |gpu_ms| ms + gpu_ms);
+    let (mut ms, mut report) = (0.0, renderer.poll_report());
+    for _ in 0..passes {
+        let begin = Instant::now();
+        renderer.render_pass(&gpu.device, &gpu.queue)?;
+        // Nothing else may be on its way: it would take time from the next mode's frame.
+        gpu.run(|_| {})?;
+        report = renderer.poll_report();
+        ms += report.gpu_ms.unwrap_or(begin.elapsed().as_secs_f64() * 1e3);
+        if report.complete() {
+            break;
         }
-        report.pass < passes
-    })?;
+    }
     Ok(Shown {
         ms,
         quality: report.completeness(),
