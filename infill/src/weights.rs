@@ -319,5 +319,6 @@ mod tests {
                 assert!(weights.iter().any(|w| *w != f16::ZERO), "{}", layer.name);
             }
         }
+        assert_ne!(Weights::trained(), Weights::trained_sparse());
     }
 }
