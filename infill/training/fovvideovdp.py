@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pyfvvdp
-from PIL import Image
+from PIL import Image  # comes with imageio
 
 FRAMES_PER_SECOND = 30
 DISPLAY = "standard_fhd"
