@@ -46,6 +46,8 @@ const MOST_STEP: f64 = 0.8;
 const MARGIN: f64 = 1.0;
 /// What a prediction about something entirely new is multiplied by, less 1.
 const CAUTION: f64 = 0.5;
+/// Part of a time that is clearly less.
+const CLEARLY_LESS: f64 = 0.9;
 /// Densities between the most and the least that are looked at.
 const CANDIDATES: u32 = 24;
 /// Unusable times in a row after which the clock counts as broken.
@@ -232,15 +234,19 @@ impl Budget {
         (density * target_ms / ms).min(density / MOST_STEP).clamp(LEAST_DENSITY, 1.0)
     }
 
-    /// The largest density that is predicted to fit, or else the one that is predicted to take least: fewer rays leave
-    /// more pixels to fill, so that time need not fall with them.
+    /// The largest density that is predicted to fit. Where none does, the one that is predicted to take clearly less than
+    /// the frame before's, or half of that one: what is not known may be better. Fewer rays leave more pixels to fill, so
+    /// time need not fall with them; from the least density on, the way is up again.
     fn fitting(&self, request: &Request<'_>, work: &Work) -> f64 {
+        let cautious_ms = |density: f64| {
+            let prediction = self.predict(request, work, density);
+            prediction.map_or(f64::INFINITY, |(ms, novelty)| ms * (1.0 + CAUTION * novelty))
+        };
         let most = (self.density / MOST_STEP).clamp(LEAST_DENSITY, 1.0);
         let (mut best, mut least_ms) = (LEAST_DENSITY, f64::INFINITY);
         for i in 0..=CANDIDATES {
             let density = most * (LEAST_DENSITY / most).powf(f64::from(i) / f64::from(CANDIDATES));
-            let Some((ms, novelty)) = self.predict(request, work, density) else { break };
-            let ms = ms * (1.0 + CAUTION * novelty);
+            let ms = cautious_ms(density);
             if ms <= MARGIN * request.target_ms {
                 return density;
             }
@@ -248,7 +254,12 @@ impl Budget {
                 (best, least_ms) = (density, ms);
             }
         }
-        best
+        let at_least = self.density <= LEAST_DENSITY;
+        if at_least || least_ms < CLEARLY_LESS * cautious_ms(self.density) {
+            best
+        } else {
+            (0.5 * self.density).max(LEAST_DENSITY)
+        }
     }
 
     /// Milliseconds, and how new this is.
@@ -307,7 +318,7 @@ mod tests {
         let grid = Grid::new(GRID);
         let mut budget = Budget::new(mode, &Ledger::new(), grid, false);
         // Active for isovalues from 0 to 1: a cell in three.
-        let active = |i: u64| if i % 3 == 0 { [0.0, 1.0] } else { [2.0, 3.0] };
+        let active = |i: u64| if i.is_multiple_of(3) { [0.0, 1.0] } else { [2.0, 3.0] };
         let ranges = (0..grid.coarse_count()).map(active).collect();
         budget.pre_pass = Some(PrePass::new(grid, ranges));
         budget

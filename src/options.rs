@@ -208,6 +208,38 @@ pub struct FrameOptions {
     /// pass adds some, until the frame is as finished as any other. Rays that were not cast are unfinished, so
     /// they show and are filled as those are, and count in [`crate::PassReport::active_rays`];
     /// [`crate::PassReport::sampled_rays`] counts the mask's. Needs [`RendererOptions::foveation`].
+    ///
+    /// ```no_run
+    /// use progressive_iso::{
+    ///     BlueNoise, Camera, CompressedVolume, Error, Foveation, Frame, FrameOptions, Infill, InfillOptions,
+    ///     InfillWeights, ProgressiveIsoRenderer, RendererOptions, wgpu,
+    /// };
+    ///
+    /// fn renderer(
+    ///     device: &wgpu::Device,
+    ///     queue: &wgpu::Queue,
+    ///     volume: CompressedVolume,
+    /// ) -> Result<ProgressiveIsoRenderer, Error> {
+    ///     let infill =
+    ///         InfillOptions { network: Some(InfillWeights::trained_sparse()), ..Default::default() };
+    ///     let options = RendererOptions {
+    ///         foveation: Some(BlueNoise::tiles()),
+    ///         infill: Some(infill),
+    ///         ..Default::default()
+    ///     };
+    ///     ProgressiveIsoRenderer::new(device, queue, volume, options)
+    /// }
+    ///
+    /// /// Whenever camera or gaze move; between, passes go on from what there is.
+    /// fn look(renderer: &mut ProgressiveIsoRenderer, camera: Camera, gaze: [f32; 2]) -> Result<(), Error> {
+    ///     let options = FrameOptions {
+    ///         foveation: Some(Foveation { gaze, ..Default::default() }),
+    ///         infill: Infill::Network,
+    ///         ..Default::default()
+    ///     };
+    ///     renderer.set_frame(&Frame { camera, isovalues: vec![0.5], options })
+    /// }
+    /// ```
     pub foveation: Option<Foveation>,
     /// Milliseconds that the frame's first pass should take. Its time is predicted, and it casts as large a share of the
     /// rays, spread evenly over the picture, as fits; the passes after it cast the others. Rays that were not

@@ -111,9 +111,10 @@ fn main() {
 
 fn run(arguments: &Arguments) -> Result<(), Failure> {
     std::fs::create_dir_all(&arguments.out)?;
-    let gpu = Gpu::new(arguments.adapter.as_deref())?;
-    let (origin, size) = (Origin::new(gpu.name()), arguments.set.size());
-    println!("adapter  {}", gpu.name());
+    let adapter = arguments.adapter.as_deref();
+    let name = Gpu::new(adapter)?.name();
+    println!("adapter  {name}");
+    let (origin, size) = (Origin::new(name), arguments.set.size());
     let wanted = arguments.volume.as_deref().unwrap_or_default();
     let mut rows: Vec<Row> = Vec::new();
     for subject in arguments.set.subjects().iter().filter(|s| s.name().contains(wanted)) {
@@ -122,7 +123,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         for &seconds in arguments.set.seconds() {
             let views = sequence::record(seconds, SEED);
             let (shown, target_ms) =
-                measure::run(&gpu, &volume, isovalue, &views, size, arguments.target_ms)?;
+                measure::run(adapter, &volume, isovalue, &views, size, arguments.target_ms)?;
             let name = format!("{}-{seconds}s", subject.name());
             let chart = chart(&name, &shown, target_ms);
             let path = arguments.out.join(format!("budget-{name}.svg"));

@@ -132,23 +132,27 @@ fn show(
 
 /// Shows a recording in all modes; the frames of each, and the target.
 pub fn run(
-    gpu: &Gpu,
+    adapter: Option<&str>,
     volume: &CompressedVolume,
     isovalue: f32,
     views: &[View],
     size: [u32; 2],
     target_ms: Option<f64>,
 ) -> Result<(Vec<Vec<Shown>>, f64), Failure> {
-    let mut renderers = MODES
-        .iter()
-        .map(|(_, mode)| renderer(gpu, volume, size, *mode))
-        .collect::<Result<Vec<_>, _>>()?;
+    // Each has a device of its own: some drivers keep a limited number of compiled shaders for each.
+    let of = |(_, mode): &(_, BudgetMode)| {
+        let gpu = Gpu::new(adapter)?;
+        let renderer = renderer(&gpu, volume, size, *mode)?;
+        Ok((gpu, renderer))
+    };
+    let mut renderers = MODES.iter().map(of).collect::<Result<Vec<_>, Failure>>()?;
     let target_ms = match target_ms {
         Some(target_ms) => target_ms,
         None => {
             let full = views.iter().step_by(EVERY).map(|view| {
                 let frame = frame(volume, view, isovalue, size, 1e6);
-                Ok(show(gpu, &mut renderers[0], &frame, 1)?.ms)
+                let (gpu, renderer) = &mut renderers[0];
+                Ok(show(gpu, renderer, &frame, 1)?.ms)
             });
             0.5 * median(full.collect::<Result<Vec<_>, Failure>>()?.into_iter())
         }
@@ -156,7 +160,8 @@ pub fn run(
     let mut shown = vec![Vec::new(); MODES.len()];
     for view in views {
         let frame = frame(volume, view, isovalue, size, target_ms);
-        for ((renderer, shown), (_, mode)) in renderers.iter_mut().zip(&mut shown).zip(MODES) {
+        for (((gpu, renderer), shown), (_, mode)) in renderers.iter_mut().zip(&mut shown).zip(MODES)
+        {
             let passes = if mode == BudgetMode::TwoPass { 2 } else { 1 };
             shown.push(show(gpu, renderer, &frame, passes)?);
         }

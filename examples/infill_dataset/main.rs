@@ -1,7 +1,7 @@
 //! Frames for training the in-fill network: `cargo run --release --example infill_dataset -- --out DIR`.
 //!
 //! Every sequence shows one generated volume. Its frames are cut at the first pass that finishes a share of the
-//! pixels; each becomes an EXR picture of half floats with what the filler knows at the cut and what the finished
+//! pixels, or with `--sampling sparse` after the first pass of a foveated frame; each becomes an EXR picture of half floats with what the filler knows at the cut and what the finished
 //! frame shows. `dataset.json` lists them. The channels are described in `docs/infill.md`.
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a command-line program")]
@@ -11,6 +11,7 @@ mod picture;
 #[path = "../stability/suite/random.rs"]
 #[allow(dead_code, reason = "shared with the example `stability`")]
 mod random;
+mod sampling;
 mod sequence;
 mod shapes;
 #[path = "../support/mod.rs"]
@@ -20,6 +21,7 @@ use std::path::PathBuf;
 
 use clap::Parser;
 use random::Random;
+use sampling::Sampling;
 use sequence::{Sequence, Subject};
 use support::{Failure, Gpu};
 
@@ -53,6 +55,9 @@ struct Arguments {
     /// Width and height of the pictures.
     #[arg(long, default_value = "384x288", value_parser = support::picture_size)]
     size: [u32; 2],
+    /// Where pictures get their holes from.
+    #[arg(long, value_enum, default_value = "cut")]
+    sampling: Sampling,
     /// Everything random follows from it.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -85,7 +90,8 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         let kind = &arguments.kinds[number as usize % arguments.kinds.len()];
         let subject = Subject::random(kind, &mut random);
         let frames = (number, arguments.frames, arguments.size);
-        let made = Sequence::new(&gpu, subject, frames, random)?.write(&gpu, &arguments.out)?;
+        let sequence = Sequence::new(&gpu, subject, frames, arguments.sampling, random)?;
+        let made = sequence.write(&gpu, &arguments.out)?;
         println!("{number:4} {kind:<14} {} frames", made.len());
         entries.extend(made);
         support::write_json(&arguments.out, "dataset.json", &entries)?;

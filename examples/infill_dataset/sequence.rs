@@ -9,7 +9,7 @@ use infill::cpu::reproject::{self, EMPTY, OldHit};
 use infill::options::Sources;
 use macrocell::Grid;
 use progressive_iso::{
-    BlockSortedOptions, Camera, Capture, CompressedVolume, Frame, FrameOptions, FrameView, Outputs,
+    BlockSortedOptions, BlueNoise, Camera, Capture, CompressedVolume, Frame, FrameView, Outputs,
     PixelStatus, ProgressiveIsoRenderer, RendererOptions, Residency, Shading, TraversalStrategy,
 };
 use serde::Serialize;
@@ -20,6 +20,7 @@ use wavefront::{FrameParams, LookAhead, ShadingParams};
 
 use crate::picture::{self, Pixel};
 use crate::random::Random;
+use crate::sampling::{End, Sampling};
 use crate::shapes::{BrainPart, Rods};
 use crate::support::{Failure, Gpu, read_words};
 
@@ -103,8 +104,9 @@ pub struct Entry {
     sequence: u32,
     frame: u32,
     size: [u32; 2],
-    /// Share of the pixels at which the frame was to be cut, and that it had at the cut.
-    cut: f64,
+    /// Where the frame was to end, and the share of the pixels that it had then.
+    #[serde(flatten)]
+    end: End,
     completeness_pixels: f64,
     holes: usize,
 }
@@ -113,6 +115,8 @@ pub struct Entry {
 pub struct Sequence {
     subject: Subject,
     renderer: ProgressiveIsoRenderer,
+    sampling: Sampling,
+    resident: bool,
     strategy: &'static str,
     motion: Motion,
     degrees: f64,
@@ -140,9 +144,13 @@ impl Sequence {
         gpu: &Gpu,
         subject: Subject,
         (number, frames, size): (u32, u32, [u32; 2]),
+        sampling: Sampling,
         mut random: Random,
     ) -> Result<Self, Failure> {
+        let resident = sampling.resident(&mut random);
         let (strategy, name) = match random.below(4) {
+            // No other has the volume resident.
+            _ if resident => (TraversalStrategy::RunAhead, "run-ahead"),
             0 => (TraversalStrategy::RunAhead, "run-ahead"),
             _ => (TraversalStrategy::BlockSorted(BlockSortedOptions::default()), "block-sorted"),
         };
@@ -158,7 +166,8 @@ impl Sequence {
             outputs: Outputs { depth: true, normal: true, status: true },
             capture: true,
             strategy,
-            residency: Residency::Cached,
+            residency: if resident { Residency::Full } else { Residency::Cached },
+            foveation: (sampling == Sampling::Sparse).then(BlueNoise::tiles),
             ..Default::default()
         };
         let (device, queue) = (&gpu.device, &gpu.queue);
@@ -175,6 +184,8 @@ impl Sequence {
             degrees: DEGREES[0] * (DEGREES[1] / DEGREES[0]).powf(random.between(0.0, 1.0)),
             subject,
             renderer,
+            sampling,
+            resident,
             strategy: name,
             motion,
             number,
@@ -213,8 +224,8 @@ impl Sequence {
         let mut history: Option<(f32, Vec<OldHit>)> = None;
         for frame in 0..self.frames {
             let view = self.view(frame)?;
-            let threshold = self.random.between(0.80, 0.98);
-            let (share, cut, states) = self.cut(gpu, &view, threshold)?;
+            let end = self.sampling.end(self.resident, &mut self.random);
+            let (share, cut, states) = self.cut(gpu, &view, end)?;
             let truth = self.finish(gpu)?;
             let old = history.take().filter(|(isovalue, _)| *isovalue == view.isovalue);
             let keys = old.map(|(_, hits)| self.scatter(&view, &hits));
@@ -224,7 +235,7 @@ impl Sequence {
                 let pixels = self.pixels(&view, &cut, &truth, &states, keys.as_deref());
                 let file = format!("{:04}_{frame:02}.exr", self.number);
                 picture::write(&out.join(&file), self.size, &pixels)?;
-                entries.push(self.entry(file, frame, &view, threshold, share, holes));
+                entries.push(self.entry(file, frame, &view, end, share, holes));
             }
             history = Some((view.isovalue, old_hits(&view, &cut, self.size)));
         }
@@ -236,7 +247,7 @@ impl Sequence {
         file: String,
         frame: u32,
         view: &View,
-        cut: f64,
+        end: End,
         share: f64,
         holes: usize,
     ) -> Entry {
@@ -252,30 +263,27 @@ impl Sequence {
             sequence: self.number,
             frame,
             size: self.size,
-            cut,
+            end,
             completeness_pixels: share,
             holes,
         }
     }
 
-    /// Renders up to the first pass that finishes `threshold` of the pixels: the share finished then, the pictures
+    /// Renders up to `end`: the share finished then, the pictures
     /// and the rays' states.
     fn cut(
         &mut self,
         gpu: &Gpu,
         view: &View,
-        threshold: f64,
+        end: End,
     ) -> Result<(f64, Capture, Vec<u32>), Failure> {
-        let frame = Frame {
-            camera: view.camera,
-            isovalues: vec![view.isovalue],
-            options: FrameOptions { rounds_per_pass: 1, ..Default::default() },
-        };
+        let frame =
+            Frame { camera: view.camera, isovalues: vec![view.isovalue], options: end.options() };
         self.renderer.clear_cache();
         self.renderer.set_frame(&frame)?;
         let (device, queue) = (&gpu.device, &gpu.queue);
         let before = |report: &progressive_iso::PassReport| {
-            report.pass == 0 || report.completeness_pixels() < threshold
+            report.pass == 0 || report.completeness_pixels() < end.share()
         };
         let report = self.renderer.render_to_completion(device, queue, |_, r| before(r))?;
         let capture = self.renderer.capture_blocking(device, queue)?;

@@ -10,8 +10,9 @@ use progressive_iso::{
 };
 use serde::Serialize;
 
-use crate::contender::{Contender, Shown, Way, shading};
+use crate::contender::{Contender, Way};
 use crate::support::plot::{Axis, Lines, Scale, Series};
+use crate::support::shown::{Shown, published_shading};
 use crate::support::subject::{Subject, stream};
 use crate::support::{Failure, Gpu, Table, write_file};
 
@@ -110,7 +111,7 @@ fn frame(volume: &CompressedVolume, size: [u32; 2], isovalue: f32, infill: Infil
     let aspect = f64::from(size[0]) / f64::from(size[1]);
     let [azimuth, elevation, fov] = VIEW_DEGREES;
     let options = FrameOptions {
-        shading: shading(),
+        shading: published_shading(),
         rounds_per_pass: 1,
         pass_ms: f32::INFINITY,
         infill,

@@ -3,8 +3,8 @@
 use gpu_testkit::image::{flip, intersection_over_union, psnr, psnr_of_change, psnr_where, ssim};
 use serde::Serialize;
 
-use crate::contender::Shown;
 use crate::subject::Motion;
+use crate::support::shown::Shown;
 use crate::support::{Table, median};
 
 /// Measures of one picture.
@@ -47,12 +47,6 @@ pub struct Row {
     pub bytes: u64,
 }
 
-/// Rec. 601 luma, 0 to 255.
-fn luma(shown: &Shown) -> Vec<f64> {
-    let luma = |[r, g, b]: [f64; 3]| 255.0 * (0.299 * r + 0.587 * g + 0.114 * b);
-    shown.colors.iter().map(|color| luma(color.map(f64::from))).collect()
-}
-
 impl Frame {
     /// `previous`: this method's and the true picture of the frame before.
     pub fn new(
@@ -70,7 +64,7 @@ impl Frame {
         Self {
             method,
             psnr: psnr(colors.as_flattened(), expected.as_flattened(), 1.0),
-            ssim: ssim(&luma(shown), &luma(truth), size),
+            ssim: ssim(&shown.luma(), &truth.luma(), size),
             psnr_holes: psnr_where(colors, expected, holes),
             iou_holes: surfaces.and_then(|(a, b)| intersection_over_union(a, b, holes)),
             tpsnr: previous.map(|(old, old_truth)| {

@@ -4,11 +4,12 @@ use std::path::Path;
 
 use progressive_iso::{BlockSortedOptions, InfillWeights, TraversalStrategy};
 
-use crate::contender::{Contender, Cut, Shown, WAYS, holes, nearest};
+use crate::contender::{Contender, Cut, WAYS};
 use crate::rows::{Frame, Row};
 use crate::subject::{Motion, Subject};
 #[cfg(feature = "published-network")]
 use crate::support::published::PublishedNetwork;
+use crate::support::shown::{Shown, holes, nearest};
 use crate::support::{Failure, Gpu, read_words};
 
 /// The renderers for one volume.
@@ -87,7 +88,7 @@ impl Sequence {
                 .map(|contender| contender.cut(gpu, camera, isovalue, cut))
                 .collect::<Result<Vec<_>, _>>()?;
             let holes = holes(&cuts[0].capture);
-            if cuts.iter().any(|c| crate::contender::holes(&c.capture) != holes) {
+            if cuts.iter().any(|c| crate::support::shown::holes(&c.capture) != holes) {
                 return Err("the renderers have finished different pixels".into());
             }
             let new_start = last_isovalue != Some(isovalue);
@@ -110,7 +111,7 @@ impl Sequence {
                         made.iter().enumerate().map(|made| scope.spawn(move || of(made))).collect();
                     threads.into_iter().map(|thread| thread.join()).collect::<Result<Vec<_>, _>>()
                 })
-                .map_err(|_| "a measure failed")?,
+                .map_err(|_panic| "a measure failed")?,
             );
             if is_last {
                 let name = format!("{}-{}-{}-{cut}", subject.name, motion.name(), motion.degrees());
@@ -170,11 +171,7 @@ impl Sequence {
     fn write(&self, out: &Path, name: &str, made: &[Made], truth: &Shown) -> Result<(), Failure> {
         let pictures = made.iter().map(|m| (m.method, &m.shown)).chain([("truth", truth)]);
         for (method, shown) in pictures {
-            let byte = |v: f32| (255.0 * v + 0.5) as u8;
-            let bytes: Vec<u8> = shown.colors.iter().flatten().map(|v| byte(*v)).collect();
-            let path = out.join(format!("{name}-{method}.png"));
-            let [width, height] = self.size;
-            image::save_buffer(path, &bytes, width, height, image::ColorType::Rgb8)?;
+            shown.write(&out.join(format!("{name}-{method}.png")), self.size)?;
         }
         Ok(())
     }

@@ -8,6 +8,7 @@ mod table;
 pub mod plot;
 #[cfg(feature = "published-network")]
 pub mod published;
+pub mod shown;
 pub mod subject;
 
 use std::path::Path;

@@ -39,6 +39,16 @@ const XYZ_FROM_RGB: [Color; 3] = [
 /// When a length is not that of `size`, or there is no pixel.
 #[must_use]
 pub fn flip(actual: &[[f32; 3]], expected: &[[f32; 3]], size: [usize; 2]) -> f64 {
+    let map = flip_map(actual, expected, size);
+    map.iter().sum::<f64>() / map.len() as f64
+}
+
+/// The difference at every pixel, of which [`flip`] is the mean.
+///
+/// # Panics
+/// When a length is not that of `size`, or there is no pixel.
+#[must_use]
+pub fn flip_map(actual: &[[f32; 3]], expected: &[[f32; 3]], size: [usize; 2]) -> Vec<f64> {
     let pixels = size[0] * size[1];
     assert!(pixels > 0, "pictures without pixels");
     assert!(actual.len() == pixels && expected.len() == pixels, "pictures of different sizes");
@@ -51,7 +61,7 @@ pub fn flip(actual: &[[f32; 3]], expected: &[[f32; 3]], size: [usize; 2]) -> f64
         let feature = (edges.max(points) / 2.0f64.sqrt()).powf(FEATURE_EXPONENT);
         stretched(color, largest).powf(1.0 - feature)
     };
-    (0..pixels).map(error).sum::<f64>() / pixels as f64
+    (0..pixels).map(error).collect()
 }
 
 /// What the eye makes of a picture.

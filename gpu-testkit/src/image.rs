@@ -1,7 +1,7 @@
 //! Metrics between two pictures of the same size.
 
-pub use crate::flip::flip;
-pub use crate::ssim::ssim;
+pub use crate::flip::{flip, flip_map};
+pub use crate::ssim::{ssim, ssim_map};
 
 /// Peak signal-to-noise ratio in dB of values in `0..=peak`; infinite for equal pictures, and
 /// minus infinity where one has a NaN or an infinity that the other has not.

@@ -17,6 +17,16 @@ const STABILISERS: [f64; 2] = [6.5025, 58.5225];
 /// When a length is not that of `size`, or there is no pixel.
 #[must_use]
 pub fn ssim(actual: &[f64], expected: &[f64], size: [usize; 2]) -> f64 {
+    let map = ssim_map(actual, expected, size);
+    map.iter().sum::<f64>() / map.len() as f64
+}
+
+/// The similarity of every pixel's window, of which [`ssim`] is the mean.
+///
+/// # Panics
+/// When a length is not that of `size`, or there is no pixel.
+#[must_use]
+pub fn ssim_map(actual: &[f64], expected: &[f64], size: [usize; 2]) -> Vec<f64> {
     let pixels = size[0] * size[1];
     assert!(pixels > 0, "pictures without pixels");
     assert!(actual.len() == pixels && expected.len() == pixels, "pictures of different sizes");
@@ -31,7 +41,7 @@ pub fn ssim(actual: &[f64], expected: &[f64], size: [usize; 2]) -> f64 {
         let means = (2.0 * a[i] * b[i] + c1) / (a[i] * a[i] + b[i] * b[i] + c1);
         means * (2.0 * covariance + c2) / (variances + c2)
     };
-    (0..pixels).map(similarity).sum::<f64>() / pixels as f64
+    (0..pixels).map(similarity).collect()
 }
 
 /// Mean of every pixel's window, one axis after the other.

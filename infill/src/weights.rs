@@ -82,6 +82,15 @@ impl Weights {
         &TRAINED
     }
 
+    /// Like [`Self::trained`], trained on the sparse pixels of foveated frames: few neighbours, no rays on their way.
+    pub fn trained_sparse() -> &'static Self {
+        static TRAINED: LazyLock<Weights> = LazyLock::new(|| {
+            Weights::from_safetensors(include_bytes!("../weights/sparse.safetensors"))
+                .unwrap_or_else(|_| Weights::zero())
+        });
+        &TRAINED
+    }
+
     /// All zero: the filler without a network.
     pub fn zero() -> Self {
         Self::from_fn(|_| 0.0)
@@ -298,12 +307,18 @@ mod tests {
     }
 
     #[test]
-    fn the_trained_weights_are_those_of_the_file() {
-        let bytes = include_bytes!("../weights/infill.safetensors");
-        assert_eq!(Weights::trained(), &Weights::from_safetensors(bytes).unwrap());
-        for (i, layer) in LAYERS.iter().enumerate() {
-            let weights = &Weights::trained().layer(i).weight;
-            assert!(weights.iter().any(|w| *w != f16::ZERO), "{}", layer.name);
+    fn the_trained_weights_are_those_of_the_files() {
+        let files: [(&Weights, &[u8]); 2] = [
+            (Weights::trained(), include_bytes!("../weights/infill.safetensors")),
+            (Weights::trained_sparse(), include_bytes!("../weights/sparse.safetensors")),
+        ];
+        for (trained, bytes) in files {
+            assert_eq!(trained, &Weights::from_safetensors(bytes).unwrap());
+            for (i, layer) in LAYERS.iter().enumerate() {
+                let weights = &trained.layer(i).weight;
+                assert!(weights.iter().any(|w| *w != f16::ZERO), "{}", layer.name);
+            }
         }
+        assert_ne!(Weights::trained(), Weights::trained_sparse());
     }
 }

@@ -24,12 +24,14 @@ import shading
 from network import Network, OUTPUTS, features, mix, shown
 from published_network import PublishedNetwork
 
-WEIGHTS = Path(__file__).parent.parent / "weights" / "infill.safetensors"
+WEIGHTS = Path(__file__).parent.parent / "weights"
 MEASURES = ["psnr", "ssim", "psnr_holes", "iou_holes", "tpsnr", "flip"]
 TOLERANCES = {"psnr": 0.02, "psnr_holes": 0.02, "tpsnr": 0.02}
 OTHER_TOLERANCE = 5e-4
 # Frames are cut at random shares of their pixels: percentages that bound the groups.
 CUTS = [80, 87, 93, 98]
+# Foveated frames have random densities far from the gaze: percentages that bound the groups.
+DENSITIES = [1, 2, 5, 10]
 
 
 class Mixture:
@@ -78,10 +80,16 @@ class Published:
         return picture, None
 
 
-def methods(published):
+def trained(name):
     network = Network()
-    network.load_state_dict({name: value.float() for name, value in load_file(WEIGHTS).items()})
-    network.eval()
+    weights = load_file(WEIGHTS / f"{name}.safetensors")
+    network.load_state_dict({name: value.float() for name, value in weights.items()})
+    return network.eval()
+
+
+def methods(published, sparse):
+    """The ways to fill; with the network for sparse masks, if the frames are foveated."""
+    network = trained("infill")
     found = {
         "unfinished": Unfinished(),
         "push-pull": Mixture(left_out="LXR"),
@@ -91,6 +99,8 @@ def methods(published):
         "network": Mixture(network),
         "network-no-history": Mixture(network, left_out="R"),
     }
+    if sparse:
+        found["network-sparse"] = Mixture(trained("sparse"))
     if published:
         found["published"] = Published(published)
     return found
@@ -125,14 +135,17 @@ def measured(frame, result, truth, before, with_flip):
 
 
 def cut_group(record):
-    bounds = zip(CUTS, CUTS[1:])
-    return next(f"{low}-{high} %" for low, high in bounds if 100 * record["cut"] <= high)
+    if "base_density" in record:
+        share, bounds, name = record["base_density"], DENSITIES, "density {}-{} %"
+    else:
+        share, bounds, name = record["cut"], CUTS, "{}-{} %"
+    return next(name.format(*ends) for ends in zip(bounds, bounds[1:]) if 100 * share <= ends[1] + 1e-4)
 
 
 def evaluate(folder, published, with_flip):
     """Mean measures by method, kind and cut."""
     data.check_split(folder, "held-out")
-    of = methods(published)
+    of = methods(published, any("base_density" in record for record in data.records(folder)))
     rows, previous, before = defaultdict(list), None, {}
     for record in data.records(folder):
         frame = data.as_frame(data.load(Path(folder) / record["file"])[None])
@@ -163,7 +176,7 @@ def table(rows):
     lines = []
     for cut in sorted({row["cut"] for row in rows}):
         kinds = sorted({row["kind"] for row in rows if row["cut"] == cut})
-        lines += [f"cut at {cut} of the pixels", "", "| method | " + " | ".join(MEASURES + kinds) + " |"]
+        lines += [cut if "density" in cut else f"cut at {cut} of the pixels", "", "| method | " + " | ".join(MEASURES + kinds) + " |"]
         lines.append("| --- |" + " ---: |" * (len(MEASURES) + len(kinds)))
         for method in dict.fromkeys(row["method"] for row in rows):
             own = [row for row in rows if row["method"] == method and row["cut"] == cut]

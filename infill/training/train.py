@@ -28,8 +28,8 @@ DROP = {"P": 0.05, "LX": 0.1, "R": 0.25}
 COLORS = [shading.DEFAULT, shading.PUBLISHED]
 LEARNING_RATE = 3e-3
 SSIM_WEIGHT = 0.5
-# Shares from which training starts, without doubt.
-START = [0.0, 0.0, -1.4, 1.1]
+# Shares and doubt from which training starts.
+START = [0.0, 0.0, -1.4, 1.1, 0.0]
 # Pulls what the residuals push beyond 0..1 back, where clamping has no gradient.
 EXCESS_WEIGHT = 0.1
 
@@ -70,9 +70,9 @@ def drop_sources(frame, rng):
     return frame
 
 
-def loss_of(network, frame, colors):
+def loss_of(network, frame, colors, start):
     outputs = network(features(frame).to(memory_format=torch.channels_last))
-    raw = mix(frame, outputs, -DOUBT, START)
+    raw = mix(frame, outputs, start[4] - DOUBT, start[:4])
     coverage, facing = shown(frame, *raw)
     picture = shading.picture(coverage, facing, colors)
     truth = shading.picture(frame["truth_c"], frame["truth_nv"], colors)
@@ -87,10 +87,10 @@ def loss_of(network, frame, colors):
     return loss, mean_square
 
 
-def validate(network, batches):
+def validate(network, batches, start):
     """Mean loss and holes-only PSNR over fixed crops."""
     with torch.no_grad():
-        results = [loss_of(network, data.as_frame(batch), colors) for batch in batches for colors in COLORS]
+        results = [loss_of(network, data.as_frame(batch), colors, start) for batch in batches for colors in COLORS]
     loss, mean_square = (torch.stack(column).mean().item() for column in zip(*results))
     return loss, metrics.psnr_of(mean_square)
 
@@ -110,6 +110,7 @@ def main():
     parser.add_argument("--steps", type=int, default=12_000)
     parser.add_argument("--batch", type=int, default=6)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--start", type=float, nargs=5, default=START, help="shares of neighbours, coarse field, thin, history; doubt")
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--validate-every", type=int, default=500)
     arguments = parser.parse_args()
@@ -128,7 +129,7 @@ def main():
     curve, losses, start = [], [], time.monotonic()
     for step in range(arguments.steps + 1):
         if step % arguments.validate_every == 0 or step == arguments.steps:
-            loss, psnr = validate(network, validation)
+            loss, psnr = validate(network, validation, arguments.start)
             mean = float(np.mean(losses)) if losses else None
             curve.append({"step": step, "training_loss": mean, "validation_loss": loss, "validation_psnr_holes": psnr})
             print(f"{step:6} {time.monotonic() - start:6.0f} s  training {mean}  validation {loss:.4f}  {psnr:.2f} dB", flush=True)
@@ -137,7 +138,7 @@ def main():
             break
         batch = np.stack([random_crop(frames, rng) for _ in range(arguments.batch)])
         colors = COLORS[rng.integers(len(COLORS))]
-        loss, _ = loss_of(network, drop_sources(data.as_frame(batch), rng), colors)
+        loss, _ = loss_of(network, drop_sources(data.as_frame(batch), rng), colors, arguments.start)
         optimiser.zero_grad()
         loss.backward()
         optimiser.step()
@@ -145,12 +146,12 @@ def main():
         losses.append(loss.item())
     with torch.no_grad():
         # What the file has is added to PRIOR and DOUBT.
-        network.head.bias[:4] += torch.tensor(START) - torch.tensor(PRIOR)
-        network.doubt.fill_(-DOUBT)
+        network.head.bias[:4] += torch.tensor(arguments.start[:4]) - torch.tensor(PRIOR)
+        network.doubt.fill_(arguments.start[4] - DOUBT)
     save_weights(network, arguments.out, torch.float16)
     if arguments.full:
         save_weights(network, arguments.full, torch.float32)
-    recipe = {k: v for k, v in vars(arguments).items() if k in ("steps", "batch", "seed")}
+    recipe = {k: v for k, v in vars(arguments).items() if k in ("steps", "batch", "seed", "start")}
     recipe |= {"frames": len(frames), "seconds": round(time.monotonic() - start), "threads": arguments.threads}
     Path(arguments.curve).write_text(json.dumps({"recipe": recipe, "curve": curve}, indent=1) + "\n")
 

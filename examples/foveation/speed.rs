@@ -1,0 +1,219 @@
+//! Times of full and of foveated frames, nothing missing.
+
+use std::time::Instant;
+
+use progressive_iso::{Foveation, Outputs, RendererOptions, Residency};
+use serde::{Deserialize, Serialize};
+
+use crate::filler::{Filler, OFF, PUSH_PULL, SPARSE, SPARSE_NO_COARSE, Way, options};
+use crate::sets::{Plan, SIGMA};
+use crate::support::{Failure, Gpu, median};
+use crate::view::{Place, Volume};
+
+/// What is measured of a volume.
+struct Case<'a> {
+    place: Place,
+    residency: Residency,
+    name: &'static str,
+    densities: &'a [f32],
+    fills: &'static [Way],
+}
+
+/// Without the coarse field, which takes longer than the full frame.
+const FILLS: &[Way] = &[PUSH_PULL, SPARSE_NO_COARSE];
+const ALL_FILLS: &[Way] = &[PUSH_PULL, SPARSE_NO_COARSE, SPARSE];
+
+/// Medians of wall times from setting a frame to its report.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Speed {
+    pub volume: String,
+    pub place: Place,
+    /// "full" or "cached", with all blocks in the cache.
+    pub residency: String,
+    pub size: [u32; 2],
+    pub base_density: f32,
+    /// Mean density, whose inverse is the most that tracing can be faster where every ray takes as long.
+    pub c_max: f64,
+    /// Share of the pixels that the mask had.
+    pub sampled: f64,
+    /// Share of the pixels whose rays enter the volume.
+    pub entered: f64,
+    /// The finished frame without foveation, colour alone.
+    pub full_ms: f64,
+    /// The first pass of the foveated one, colour alone, not filled.
+    pub traced_ms: f64,
+    pub traced_speedup: f64,
+    /// Tracing against 1 / `c_max`.
+    pub efficiency: f64,
+    pub fills: Vec<Fill>,
+}
+
+/// The first pass with filling, depth and normals included.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Fill {
+    pub method: String,
+    pub ms: f64,
+    pub speedup: f64,
+}
+
+/// A renderer with the frames of which it takes the times.
+struct Clocked {
+    filler: Filler,
+    place: Place,
+    size: [u32; 2],
+    foveated: bool,
+    ms: Vec<f64>,
+    sampled: f64,
+    entered: f64,
+}
+
+/// Adds a row for every density, with a warm cache and with everything resident.
+pub fn measure(
+    gpu: &Gpu,
+    volume: &Volume,
+    plan: &Plan,
+    rows: &mut Vec<Speed>,
+) -> Result<(), Failure> {
+    let near = Case {
+        place: Place::Near,
+        residency: Residency::Cached,
+        name: "cached",
+        densities: plan.speed_densities,
+        fills: FILLS,
+    };
+    let middle = std::slice::from_ref(&plan.middle_density);
+    let full = Case {
+        residency: Residency::Full,
+        name: "full",
+        densities: middle,
+        fills: ALL_FILLS,
+        ..near
+    };
+    let far = Case { place: Place::Far, densities: middle, ..near };
+    for case in [near, full, far] {
+        measure_case(gpu, volume, plan, &case, rows)?;
+    }
+    Ok(())
+}
+
+fn measure_case(
+    gpu: &Gpu,
+    volume: &Volume,
+    plan: &Plan,
+    case: &Case<'_>,
+    rows: &mut Vec<Speed>,
+) -> Result<(), Failure> {
+    let clocked = |way, foveated| {
+        let residency = case.residency;
+        let options = RendererOptions { residency, ..options(plan.speed_size, way, foveated) };
+        Clocked::new(gpu, volume, case.place, way, options)
+    };
+    let mut contenders = vec![clocked(OFF, false)?, clocked(OFF, true)?];
+    for way in case.fills {
+        contenders.push(clocked(*way, true)?);
+    }
+    for &base_density in case.densities {
+        let foveation = Foveation { sigma: SIGMA, base_density, ..Foveation::default() };
+        for run in 0..=plan.runs {
+            for contender in &mut contenders {
+                contender.run(gpu, volume, run, foveation)?;
+            }
+        }
+        let row = Speed::new(volume, case.name, foveation, &mut contenders);
+        println!("{}", row.line());
+        rows.push(row);
+    }
+    Ok(())
+}
+
+impl Clocked {
+    /// Renders a frame to its end, so that whatever it needs is decoded.
+    fn new(
+        gpu: &Gpu,
+        volume: &Volume,
+        place: Place,
+        way: Way,
+        options: RendererOptions,
+    ) -> Result<Self, Failure> {
+        let options = RendererOptions { outputs: Outputs::default(), capture: false, ..options };
+        let (size, foveated) = (options.size, options.foveation.is_some());
+        let mut filler = Filler::new(gpu, volume, way, options)?;
+        filler.set_frame(volume.camera(place, 0, size), None)?;
+        filler.finish(gpu)?;
+        Ok(Self { filler, place, size, foveated, ms: Vec::new(), sampled: 1.0, entered: 0.0 })
+    }
+
+    /// One frame; the first of a series does not count.
+    fn run(
+        &mut self,
+        gpu: &Gpu,
+        volume: &Volume,
+        run: u32,
+        foveation: Foveation,
+    ) -> Result<(), Failure> {
+        let camera = volume.camera(self.place, 0, self.size);
+        let start = Instant::now();
+        self.filler.set_frame(camera, self.foveated.then_some(foveation))?;
+        let report =
+            if self.foveated { self.filler.pass(gpu)? } else { self.filler.finish(gpu)? };
+        let ms = start.elapsed().as_secs_f64() * 1e3;
+        let share = |count: u32| f64::from(count) / f64::from(report.rays);
+        (self.sampled, self.entered) = (share(report.sampled_rays), share(report.entered_rays));
+        if run > 0 {
+            self.ms.push(ms);
+        }
+        Ok(())
+    }
+
+    fn take_median(&mut self) -> f64 {
+        median(std::mem::take(&mut self.ms).into_iter())
+    }
+}
+
+impl Speed {
+    /// From the runs of the full frame, the traced one and the filled ones.
+    fn new(
+        volume: &Volume,
+        residency: &'static str,
+        foveation: Foveation,
+        contenders: &mut [Clocked],
+    ) -> Self {
+        let ms: Vec<f64> = contenders.iter_mut().map(Clocked::take_median).collect();
+        let (full_ms, traced_ms) = (ms[0], ms[1]);
+        let Clocked { place, size, sampled, entered, .. } = contenders[1];
+        let c_max = foveation.mean_density(size);
+        let fill = |contender: (&Clocked, &f64)| Fill {
+            method: contender.0.filler.way.name.into(),
+            ms: *contender.1,
+            speedup: full_ms / contender.1,
+        };
+        Self {
+            volume: volume.name.clone(),
+            place,
+            residency: residency.into(),
+            size,
+            base_density: foveation.base_density,
+            c_max,
+            sampled,
+            entered,
+            full_ms,
+            traced_ms,
+            traced_speedup: full_ms / traced_ms,
+            efficiency: full_ms / traced_ms * c_max,
+            fills: contenders[2..].iter().zip(&ms[2..]).map(fill).collect(),
+        }
+    }
+
+    /// One line of progress.
+    fn line(&self) -> String {
+        let Self { volume, place, residency, base_density, full_ms, traced_ms, .. } = self;
+        let fills: Vec<String> = self.fills.iter().map(|fill| format!("{:.1}", fill.ms)).collect();
+        format!(
+            "{volume:<16} {place:?} {residency:<6} {base_density:.3} full {full_ms:.1} traced {traced_ms:.1} \
+             filled {} ms, {:.2} x of at most {:.2} x",
+            fills.join(", "),
+            self.traced_speedup,
+            1.0 / self.c_max
+        )
+    }
+}
