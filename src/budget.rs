@@ -42,8 +42,6 @@ const LEAST_DENSITY: f64 = 1.0 / 64.0;
 const FIRST_DENSITY: f64 = 1.0 / 16.0;
 /// From frame to frame the step between rays shrinks by this factor at most (the publication's limit).
 const MOST_STEP: f64 = 0.8;
-/// Part of the target that a prediction may take: times scatter.
-const MARGIN: f64 = 1.0;
 /// What a prediction about something entirely new is multiplied by, less 1.
 const CAUTION: f64 = 0.5;
 /// Part of a time that is clearly less.
@@ -183,31 +181,36 @@ impl Budget {
         let begin = Instant::now();
         let Request { view, size, isovalue, target_ms, .. } = *request;
         let work = self.pre_pass.as_mut().map(|pre_pass| pre_pass.estimate(view, size, isovalue));
-        let density = match (self.mode, work) {
+        let outlook = work.map(|work| Outlook::new(request, &work, self.cached));
+        let density = match (self.mode, &outlook) {
             _ if self.unusable >= MOST_UNUSABLE => 1.0,
             (BudgetMode::Fixed, _) => 1.0,
             (BudgetMode::TwoPass, _) => (self.after_last(target_ms) / 4.0).max(LEAST_DENSITY),
-            (BudgetMode::Predicted, Some(work)) if self.level.is_some() => {
-                self.fitting(request, &work)
+            (BudgetMode::Predicted, Some(outlook)) if self.level.is_some() => {
+                self.fitting(outlook, target_ms)
             }
             _ => self.after_last(target_ms),
         };
         self.density = density;
         let (mut features, mut units, mut predicted_ms) = ([0.0; FEATURES], 0.0, None);
-        if let Some(work) = &work {
-            features = self.features(request, work, density);
-            units = self.units(request, work, density);
-            predicted_ms = self.predict(request, work, density).map(|(ms, _)| ms);
+        if let Some(outlook) = &outlook {
+            (features, units) = (outlook.features(density), outlook.units(density));
+            predicted_ms = self.predict(outlook, density).map(|(ms, _)| ms);
         }
         let cpu_ms = begin.elapsed().as_secs_f64() * 1e3 + self.learning_ms;
         Choice { features, work: units, density, predicted_ms, target_ms, cpu_ms }
     }
 
-    /// The density of a frame's second pass, for [`BudgetMode::TwoPass`], once the first one's time is known.
-    pub(crate) fn second(&self, choice: &Choice) -> Option<f64> {
-        let (density, ms) = self.last.filter(|_| self.mode == BudgetMode::TwoPass)?;
-        let fits = density * choice.target_ms / ms;
-        (density.to_bits() == choice.density.to_bits()).then(|| fits.clamp(density, 1.0))
+    /// The sampling mask of a frame from its second pass on: that of its first one, or with [`BudgetMode::TwoPass`]
+    /// one of as many rays as that one's time leaves room for, once it is known.
+    pub(crate) fn second(&self, choice: &Choice, first: Option<Foveation>) -> Option<Foveation> {
+        let two_pass = self.last.filter(|(density, _)| {
+            self.mode == BudgetMode::TwoPass && density.to_bits() == choice.density.to_bits()
+        });
+        let (Some((density, ms)), Some(first)) = (two_pass, first) else { return first };
+        let fits = (density * choice.target_ms / ms).clamp(density, 1.0);
+        // The mask of the second pass has 1 - (1 - d)^2 of the rays.
+        Some(Foveation { base_density: 1.0 - (1.0 - fits as f32).sqrt(), ..first })
     }
 
     /// Learns what a frame's first pass took.
@@ -237,9 +240,9 @@ impl Budget {
     /// The largest density that is predicted to fit. Where none does, the one that is predicted to take clearly less than
     /// the frame before's, or half of that one: what is not known may be better. Fewer rays leave more pixels to fill, so
     /// time need not fall with them; from the least density on, the way is up again.
-    fn fitting(&self, request: &Request<'_>, work: &Work) -> f64 {
+    fn fitting(&self, outlook: &Outlook, target_ms: f64) -> f64 {
         let cautious_ms = |density: f64| {
-            let prediction = self.predict(request, work, density);
+            let prediction = self.predict(outlook, density);
             prediction.map_or(f64::INFINITY, |(ms, novelty)| ms * (1.0 + CAUTION * novelty))
         };
         let most = (self.density / MOST_STEP).clamp(LEAST_DENSITY, 1.0);
@@ -247,7 +250,7 @@ impl Budget {
         for i in 0..=CANDIDATES {
             let density = most * (LEAST_DENSITY / most).powf(f64::from(i) / f64::from(CANDIDATES));
             let ms = cautious_ms(density);
-            if ms <= MARGIN * request.target_ms {
+            if ms <= target_ms {
                 return density;
             }
             if ms < least_ms {
@@ -263,47 +266,83 @@ impl Budget {
     }
 
     /// Milliseconds, and how new this is.
-    fn predict(&self, request: &Request<'_>, work: &Work, density: f64) -> Option<(f64, f64)> {
+    fn predict(&self, outlook: &Outlook, density: f64) -> Option<(f64, f64)> {
         let level = self.level?;
-        let (cost, novelty) = self.model.predict(&self.features(request, work, density));
-        Some((self.units(request, work, density) * (level + cost).exp(), novelty))
+        let (cost, novelty) = self.model.predict(&outlook.features(density));
+        Some((outlook.units(density) * (level + cost).exp(), novelty))
     }
+}
 
-    /// Work in visits of a block.
-    fn units(&self, request: &Request<'_>, work: &Work, density: f64) -> f64 {
-        let rays = request.size.map(f64::from).iter().product::<f64>();
-        let filled = if request.fills { (1.0 - density) * work.entered * FILL_WORK } else { 0.0 };
-        let cast = density * work.entered * (1.0 + work.visited);
-        let decoded = if self.cached { work.fresh * work.in_sight * DECODE_WORK } else { 0.0 };
-        rays * (START_WORK + cast + filled) + decoded * density.sqrt()
-    }
+/// What is known of a frame before its density is chosen.
+#[derive(Clone, Copy, Debug)]
+struct Outlook {
+    /// In visits of a block: for every frame, more if all rays are cast, or if all pixels are filled instead, and for
+    /// all blocks that such a frame decodes.
+    started: f64,
+    cast: f64,
+    filled: f64,
+    decoded: f64,
+    /// With a density of 1.
+    features: [f64; FEATURES],
+}
 
-    fn features(&self, request: &Request<'_>, work: &Work, density: f64) -> [f64; FEATURES] {
-        let Request { view, size, look_ahead, .. } = *request;
+impl Outlook {
+    fn new(request: &Request<'_>, work: &Work, cached: bool) -> Self {
+        let Request { view, size, look_ahead, fills, .. } = *request;
         let middle = size.map(|s| s / 2);
         let (_, direction, _) = view.ray(middle);
         let (_, beside, _) = view.ray([middle[0] + 1, middle[1]]);
         let apart = glam::DVec3::from(direction).distance(beside.into());
         let voxels_per_pixel = (apart * work.distance_voxels).max(1e-3);
         let rays = size.map(f64::from).iter().product::<f64>();
-        [
-            0.7 * density.ln(),
-            (1.0 + work.visited).ln(),
-            work.entered,
-            0.5 * (1.0 + work.depth_voxels).ln(),
-            if self.cached { 2.0 * work.fresh } else { 0.0 },
-            0.3 * f64::from(look_ahead.max(1)).ln(),
-            0.3 * voxels_per_pixel.ln(),
-            0.5 * rays.ln(),
-            0.4 * direction[0],
-            0.4 * direction[1],
-        ]
+        let fresh = if cached { work.fresh } else { 0.0 };
+        Self {
+            started: rays * START_WORK,
+            cast: rays * work.entered * (1.0 + work.visited),
+            filled: if fills { rays * work.entered * FILL_WORK } else { 0.0 },
+            decoded: fresh * work.in_sight * DECODE_WORK,
+            features: [
+                0.0,
+                (1.0 + work.visited).ln(),
+                work.entered,
+                0.5 * (1.0 + work.depth_voxels).ln(),
+                2.0 * fresh,
+                0.3 * f64::from(look_ahead.max(1)).ln(),
+                0.3 * voxels_per_pixel.ln(),
+                0.5 * rays.ln(),
+                0.4 * direction[0],
+                0.4 * direction[1],
+            ],
+        }
+    }
+
+    /// Work in visits of a block.
+    fn units(&self, density: f64) -> f64 {
+        let rays = self.started + density * self.cast + (1.0 - density) * self.filled;
+        rays + self.decoded * density.sqrt()
+    }
+
+    fn features(&self, density: f64) -> [f64; FEATURES] {
+        let mut features = self.features;
+        features[0] = 0.7 * density.ln();
+        features
     }
 }
 
 /// Bytes of all coarse cells' ranges.
 fn range_bytes(grid: Grid) -> u64 {
     8 * grid.coarse_count()
+}
+
+/// Numbers from 0 to 1 that look random, the same in every run.
+#[cfg(test)]
+fn noise(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed;
+    move || {
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1u64 << 53) as f64
+    }
 }
 
 #[cfg(test)]
@@ -415,9 +454,11 @@ mod tests {
             target_ms: 20.0,
         };
         let choice = budget.choose(&request);
-        assert_eq!(budget.second(&choice), None, "nothing is known of it yet");
+        let first = choice.foveation();
+        assert_eq!(budget.second(&choice, first), first, "nothing is known of it yet");
         budget.learn(&choice, 5.0);
-        let second = budget.second(&choice);
-        assert!(second.is_some_and(|d| (d - 4.0 * choice.density).abs() < 1e-12), "{second:?}");
+        let second = budget.second(&choice, first).map(|f| f64::from(f.base_density));
+        let expected = 1.0 - (1.0 - 4.0 * choice.density).sqrt();
+        assert!(second.is_some_and(|d| (d - expected).abs() < 1e-6), "{second:?}: {expected}");
     }
 }

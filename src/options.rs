@@ -36,9 +36,10 @@ pub enum Residency {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum InfillWhen {
-    /// Not where the whole volume is resident and frames are neither foveated nor held to a time: every ray ends in a frame's first pass
-    /// there, unless a dispatch would take long, so there is nothing to fill. [`crate::ScenePlan`] leaves it out, frames
-    /// may ask for it all the same, and unfinished pixels show [`Shading::unfinished`].
+    /// Not where the whole volume is resident and frames are neither foveated nor held to a time: every ray
+    /// ends in a frame's first pass there, unless a dispatch would take long, so there is nothing to fill.
+    /// [`crate::ScenePlan`] leaves it out, frames may ask for it all the same, and unfinished pixels show
+    /// [`Shading::unfinished`].
     #[default]
     WhereItPays,
     /// Always.

@@ -85,7 +85,7 @@ struct FrameState {
     most_cells: u32,
     passes: u32,
     rounds: u32,
-    /// Which rays its passes may cast; `None`: all.
+    /// Which rays its passes may cast, once it has started; `None`: all.
     foveation: Option<Foveation>,
     /// What its setting was chosen by, if it is held to a time.
     choice: Option<Choice>,
@@ -184,7 +184,7 @@ impl ProgressiveIsoRenderer {
             most_cells: 0,
             passes: 0,
             rounds: 0,
-            foveation: frame.options.foveation,
+            foveation: None,
             choice: None,
         });
         self.records.report.newest_frame = self.frame_count;
@@ -376,12 +376,9 @@ impl ProgressiveIsoRenderer {
         let (Phase::Rendering(rendering), Some(state)) = (&self.phase, &mut self.frame) else {
             return;
         };
-        if let (Some(budget), Some(choice), Some(foveation), 1) =
-            (&self.records.budget, &state.choice, &mut state.foveation, state.passes)
-            && let Some(density) = budget.second(choice)
+        if let (Some(budget), Some(choice), 1) = (&self.records.budget, &state.choice, state.passes)
         {
-            // The mask of the second pass has 1 - (1 - d)^2 of the rays.
-            foveation.base_density = 1.0 - (1.0 - density as f32).sqrt();
+            state.foveation = budget.second(choice, state.foveation);
         }
         if state.passes > 0
             && let Some(sampling) = state.sampling(self.options.size)

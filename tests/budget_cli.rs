@@ -4,12 +4,7 @@
 
 mod cli;
 
-use serde_json::Value;
-
-fn some(value: &Value, key: &str) -> f64 {
-    value[key].as_f64().unwrap_or_else(|| panic!("{key} of {value}"))
-}
-
+use cli::number;
 #[test]
 fn every_mode_shows_the_same_recording() {
     let folder = cli::folder("budget_cli", "test");
@@ -23,15 +18,15 @@ fn every_mode_shows_the_same_recording() {
         assert_eq!((&row["frames"], &row["seconds"]), (&30.into(), &5.into()), "{row}");
         assert_eq!(row["target_ms"], rows[0]["target_ms"], "{row}");
         let [rmse, above, below] =
-            ["rmse_ms", "rmse_above_ms", "rmse_below_ms"].map(|key| some(row, key));
+            ["rmse_ms", "rmse_above_ms", "rmse_below_ms"].map(|key| number(row, key));
         assert!(rmse <= above.max(below) + 1e-9, "{row}");
-        assert!(some(row, "largest_above_ms") >= above - 1e-9, "{row}");
-        assert!(some(row, "largest_below_ms") >= below - 1e-9, "{row}");
-        assert!(some(row, "most_budget_ms") >= some(row, "budget_ms"), "{row}");
-        let error = some(row, "prediction_error");
+        assert!(number(row, "largest_above_ms") >= above - 1e-9, "{row}");
+        assert!(number(row, "largest_below_ms") >= below - 1e-9, "{row}");
+        assert!(number(row, "most_budget_ms") >= number(row, "budget_ms"), "{row}");
+        let error = number(row, "prediction_error");
         assert!(error.is_finite() && error >= 0.0, "{row}");
         let adapts = row["mode"] != "no adaptation";
-        assert_eq!(some(row, "quality") < 1.0, adapts, "{row}");
+        assert_eq!(number(row, "quality") < 1.0, adapts, "{row}");
     }
     let plot = std::fs::read_to_string(cli::path(&folder, "budget-turbulence-48-5s.svg")).unwrap();
     assert!(plot.contains("two pass") && printed.contains("Against the last frame"), "{printed}");

@@ -4,20 +4,17 @@
 
 mod cli;
 
+use cli::number;
 use serde_json::Value;
 
 /// Relative error of numbers with five digits, of which four are added.
 const ROUNDING: f64 = 1e-4;
 
 /// The number of a key; `None` where JSON has null: infinity or nothing to compare.
-fn number(value: &Value, key: &str) -> Option<f64> {
+fn number_or_null(value: &Value, key: &str) -> Option<f64> {
     let value = value.get(key).unwrap_or_else(|| panic!("no {key} in {value}"));
     assert!(value.is_number() || value.is_null(), "{key} is {value}");
     value.as_f64()
-}
-
-fn some(value: &Value, key: &str) -> f64 {
-    number(value, key).unwrap_or_else(|| panic!("{key} of {value}"))
 }
 
 fn points(curve: &Value) -> &[Value] {
@@ -38,19 +35,26 @@ fn check_progress(curve: &Value) {
         for (key, sign) in
             [("completeness", 1.0), ("ms", 1.0), ("pass", 1.0), ("open_depth_voxels", -1.0)]
         {
-            let [before, after] = [0, 1].map(|i| sign * some(&pair[i], key));
+            let [before, after] = [0, 1].map(|i| sign * number(&pair[i], key));
             assert!(after >= before, "{key} goes from {before} to {after}: {curve}");
         }
     }
-    let (last, setup_ms) = (points.last().unwrap(), some(curve, "setup_ms"));
-    assert!(setup_ms > 0.0 && some(&points[0], "ms") > setup_ms, "set-up is not counted: {curve}");
-    assert_eq!(some(last, "completeness"), 1.0);
-    assert_eq!(some(last, "open_depth_voxels"), 0.0);
-    assert_eq!(some(last, "pass"), some(curve, "passes"));
+    let (last, setup_ms) = (points.last().unwrap(), number(curve, "setup_ms"));
+    assert!(
+        setup_ms > 0.0 && number(&points[0], "ms") > setup_ms,
+        "set-up is not counted: {curve}"
+    );
+    assert_eq!(number(last, "completeness"), 1.0);
+    assert_eq!(number(last, "open_depth_voxels"), 0.0);
+    assert_eq!(number(last, "pass"), number(curve, "passes"));
     let rest = &last["against_finished"];
-    assert_eq!(number(rest, "psnr"), None, "the last picture is not the finished one: {rest}");
+    assert_eq!(
+        number_or_null(rest, "psnr"),
+        None,
+        "the last picture is not the finished one: {rest}"
+    );
     for key in ["color_rms", "mask_disagreement", "depth_max_voxels", "normal_max_degrees"] {
-        assert_eq!(number(rest, key), Some(0.0), "{key}");
+        assert_eq!(number_or_null(rest, key), Some(0.0), "{key}");
     }
 }
 
@@ -60,10 +64,10 @@ fn check_sources(curve: &Value) {
     for point in points(curve) {
         for key in ["color_rms", "mask_disagreement"] {
             let parts = [
-                some(point, key),
-                some(&point["against_finished"], key),
-                some(&curve["arithmetic"], key),
-                some(&curve["compression"], key),
+                number(point, key),
+                number(&point["against_finished"], key),
+                number(&curve["arithmetic"], key),
+                number(&curve["compression"], key),
             ];
             let sum: f64 = parts.iter().sum();
             for part in parts {
@@ -85,15 +89,15 @@ fn the_numbers_of_a_run_agree_with_each_other() {
         check_progress(curve);
         check_sources(curve);
         // The picture depends on the rate alone: compare with the first curve of the same rate.
-        let same_rate = |other: &&Value| some(other, "rate") == some(curve, "rate");
+        let same_rate = |other: &&Value| number(other, "rate") == number(curve, "rate");
         let first = curves.iter().find(same_rate).unwrap();
         for key in ["psnr", "ssim", "mask_disagreement", "depth_max_voxels"] {
-            let [a, b] = [curve, first].map(|c| number(points(c).last().unwrap(), key));
+            let [a, b] = [curve, first].map(|c| number_or_null(points(c).last().unwrap(), key));
             assert_eq!(a, b, "{key} of finished pictures");
         }
     }
     let all = || curves.iter().flat_map(points);
-    let unfinished = all().filter(|p| some(&p["against_finished"], "mask_disagreement") > 0.0);
+    let unfinished = all().filter(|p| number(&p["against_finished"], "mask_disagreement") > 0.0);
     assert!(unfinished.count() > 0, "no picture was looked at before it was finished");
     check_rates(curves);
     check_front(all());
@@ -105,8 +109,8 @@ fn the_numbers_of_a_run_agree_with_each_other() {
 /// Compression costs more than arithmetic, and less at the higher rate.
 fn check_rates(curves: &[Value]) {
     let rms = |source: &str, rate: f64| {
-        let curve = curves.iter().find(|curve| some(curve, "rate") == rate).unwrap();
-        some(&curve[source], "color_rms")
+        let curve = curves.iter().find(|curve| number(curve, "rate") == rate).unwrap();
+        number(&curve[source], "color_rms")
     };
     assert!(rms("compression", 2.0) > 10.0 * rms("compression", 8.0));
     assert!(rms("compression", 2.0) > 100.0 * rms("arithmetic", 2.0));
@@ -116,7 +120,7 @@ fn check_rates(curves: &[Value]) {
 
 /// No point has a better picture as early as one on the front.
 fn check_front<'a>(points: impl Iterator<Item = &'a Value> + Clone) {
-    let place = |p: &Value| (some(p, "ms"), some(p, "psnr"));
+    let place = |p: &Value| (number(p, "ms"), number(p, "psnr"));
     let front: Vec<_> =
         points.clone().filter(|p| p["on_front"] == Value::Bool(true)).map(place).collect();
     assert!(!front.is_empty());

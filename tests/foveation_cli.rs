@@ -4,11 +4,8 @@
 
 mod cli;
 
+use cli::number;
 use serde_json::Value;
-
-fn number(value: &Value, key: &str) -> f64 {
-    value[key].as_f64().unwrap_or_else(|| panic!("no number {key} in {value}"))
-}
 
 /// Fovea and periphery make up the picture, so its error is between theirs.
 fn check_quality(row: &Value) {

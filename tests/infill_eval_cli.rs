@@ -4,13 +4,10 @@
 
 mod cli;
 
+use cli::number;
 use serde_json::Value;
 
 const WEIGHTS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/infill/weights/infill.safetensors");
-
-fn some(value: &Value, key: &str) -> f64 {
-    value[key].as_f64().unwrap_or_else(|| panic!("{key} of {value}"))
-}
 
 /// Of every motion a row for each method; only what fills takes memory, and everything is better than
 /// leaving holes.
@@ -29,18 +26,18 @@ fn check_rows(rows: &[Value]) {
         let own: Vec<&Value> = rows.iter().filter(|row| row["motion"] == motion).collect();
         let found: Vec<&str> = own.iter().map(|row| row["method"].as_str().unwrap()).collect();
         assert_eq!(found, methods, "{motion}");
-        let unfinished = some(own[0], "psnr_holes");
+        let unfinished = number(own[0], "psnr_holes");
         for row in own {
             let method = row["method"].as_str().unwrap();
             assert_eq!(row["frames"], 2);
-            assert!((0.85..1.0).contains(&some(row, "completeness_pixels")), "{row}");
+            assert!((0.85..1.0).contains(&number(row, "completeness_pixels")), "{row}");
             let fills = !["unfinished", "nearest", "more-passes"].contains(&method);
-            assert_eq!(some(row, "bytes") > 0.0, fills, "{row}");
+            assert_eq!(number(row, "bytes") > 0.0, fills, "{row}");
             if method == "more-passes" {
-                assert!(some(row, "ssim") >= some(&rows[0], "ssim"), "{row}");
+                assert!(number(row, "ssim") >= number(&rows[0], "ssim"), "{row}");
             } else {
-                assert_eq!(some(row, "exact"), 0.0, "no guess is exact everywhere: {row}");
-                assert!(method == "unfinished" || some(row, "psnr_holes") > unfinished + 3.0);
+                assert_eq!(number(row, "exact"), 0.0, "no guess is exact everywhere: {row}");
+                assert!(method == "unfinished" || number(row, "psnr_holes") > unfinished + 3.0);
             }
         }
     }
@@ -52,18 +49,18 @@ fn check_curve(curve: &Value) {
     let points = curve["points"].as_array().unwrap();
     for pair in points.windows(2) {
         for key in ["pass", "ms", "completeness"] {
-            assert!(some(&pair[1], key) >= some(&pair[0], key), "{key}: {curve}");
+            assert!(number(&pair[1], key) >= number(&pair[0], key), "{key}: {curve}");
         }
     }
     for point in points {
-        let enough = some(point, "completeness") >= 0.85;
+        let enough = number(point, "completeness") >= 0.85;
         assert_eq!(point["stopped"], enough, "{curve}");
-        let holes = some(point, "completeness") < 1.0;
+        let holes = number(point, "completeness") < 1.0;
         let fills = curve["method"] != "unfinished" && enough && holes;
-        assert_eq!(some(point, "filled_pixels") > 0.0, fills, "{curve}");
+        assert_eq!(number(point, "filled_pixels") > 0.0, fills, "{curve}");
     }
     let last = points.last().unwrap();
-    assert_eq!((some(last, "completeness"), &last["psnr"]), (1.0, &Value::Null), "{curve}");
+    assert_eq!((number(last, "completeness"), &last["psnr"]), (1.0, &Value::Null), "{curve}");
 }
 
 #[test]

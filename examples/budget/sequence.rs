@@ -3,6 +3,7 @@
 use progressive_iso::{Camera, CompressedVolume};
 
 use crate::random::Random;
+use crate::support::camera_at;
 
 /// Frames that are shown in a second of the recording.
 const FRAMES_PER_SECOND: u32 = 6;
@@ -60,18 +61,9 @@ pub fn record(seconds: u32, seed: u64) -> Vec<View> {
 
 impl View {
     pub fn camera(&self, volume: &CompressedVolume, size: [u32; 2]) -> Camera {
-        let (center, radius) = volume.bounding_ball();
-        let aspect = f64::from(size[0]) / f64::from(size[1]);
-        let half = (FIELD_OF_VIEW_DEGREES / 2.0).to_radians();
-        let [azimuth, elevation] = [self.azimuth, self.elevation].map(f64::to_radians);
-        let away = glam::DVec3::new(
-            azimuth.sin() * elevation.cos(),
-            elevation.sin(),
-            azimuth.cos() * elevation.cos(),
-        );
-        let eye = glam::DVec3::from(center) + away * (self.distance * radius / half.sin());
-        let (up, near, far) = ([0.0, 1.0, 0.0], 0.01 * radius, 6.0 * radius);
+        let (_, radius) = volume.bounding_ball();
         let fov = FIELD_OF_VIEW_DEGREES;
-        Camera::perspective(eye.to_array(), center, up, fov, aspect, near, far)
+        let distance = self.distance * radius / (fov / 2.0).to_radians().sin();
+        camera_at(volume, [self.azimuth, self.elevation], distance, fov, size, 6.0)
     }
 }

@@ -53,13 +53,7 @@ fn orbit_degrees(frame: u32) -> f64 {
 }
 
 fn main() {
-    tracing_subscriber::fmt()
-        .with_env_filter(tracing_subscriber::EnvFilter::from_default_env())
-        .init();
-    if let Err(error) = run(&Arguments::parse()) {
-        eprintln!("custom_loop: {error}");
-        std::process::exit(1);
-    }
+    support::main("custom_loop", || run(&Arguments::parse()));
 }
 
 fn run(arguments: &Arguments) -> Result<(), Failure> {

@@ -120,13 +120,7 @@ struct File<'a> {
 }
 
 fn main() {
-    tracing_subscriber::fmt()
-        .with_env_filter(tracing_subscriber::EnvFilter::from_default_env())
-        .init();
-    if let Err(error) = run(&Arguments::parse()) {
-        eprintln!("foveation: {error}");
-        std::process::exit(1);
-    }
+    support::main("foveation", || run(&Arguments::parse()));
 }
 
 fn run(arguments: &Arguments) -> Result<(), Failure> {

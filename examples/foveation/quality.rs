@@ -192,11 +192,7 @@ impl<'a> Contest<'a> {
     #[cfg(feature = "published-network")]
     fn published(&self, frame: u32) -> Result<Option<Shown>, Failure> {
         let Some(network) = &self.published else { return Ok(None) };
-        if frame == 0 {
-            network.clear(self.gpu)?;
-        }
-        network.fill(self.gpu)?;
-        Ok(Some(Shown::from_words(&crate::support::read_words(self.gpu, network.output())?)))
+        Ok(Some(network.picture(self.gpu, frame == 0)?.0))
     }
 
     #[cfg(not(feature = "published-network"))]

@@ -5,7 +5,7 @@ use crate::quality::Quality;
 use crate::rest::Rest;
 use crate::speed::Speed;
 use crate::support::plot::{Axis, Lines, Scale, Series};
-use crate::support::{Origin, Table};
+use crate::support::{Origin, Table, distinct, mean};
 use crate::view::Place;
 
 pub fn all(origin: &Origin, quality: &[Quality], rest: &[Rest], speed: &[Speed]) -> String {
@@ -14,24 +14,8 @@ pub fn all(origin: &Origin, quality: &[Quality], rest: &[Rest], speed: &[Speed])
     [head, regions(quality), volumes(quality), resting(rest), times(speed)].concat()
 }
 
-fn distinct<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<T> {
-    let mut found = Vec::new();
-    for value in values {
-        if !found.contains(&value) {
-            found.push(value);
-        }
-    }
-    found
-}
-
 fn decibels(value: Option<f64>) -> String {
     value.map_or("exact".into(), |v| format!("{v:.2}"))
-}
-
-/// Mean of the finite values.
-fn mean(values: impl Iterator<Item = Option<f64>>) -> Option<f64> {
-    let known: Vec<f64> = values.flatten().collect();
-    (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64)
 }
 
 /// Means over the volumes, a table for every density.

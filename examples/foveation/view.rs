@@ -4,8 +4,8 @@ use progressive_iso::{Camera, CompressedVolume, Foveation};
 use serde::{Deserialize, Serialize};
 
 use crate::sets::SIGMA;
-use crate::support::Failure;
 use crate::support::subject::{Subject, stream};
+use crate::support::{Failure, camera_at};
 
 const FIELD_OF_VIEW_DEGREES: f64 = 50.0;
 const ELEVATION_DEGREES: f64 = 15.0;
@@ -49,12 +49,7 @@ impl Volume {
         if place == Place::Far {
             return Camera::orbit(center, radius, azimuth, elevation, fov, aspect);
         }
-        let (azimuth, elevation) = (azimuth.to_radians(), elevation.to_radians());
-        let level = elevation.cos();
-        let away = [azimuth.sin() * level, elevation.sin(), azimuth.cos() * level];
-        let eye = [0, 1, 2].map(|a| center[a] + radius * away[a]);
-        let [near, far] = [0.01, 2.01].map(|share| share * radius);
-        Camera::perspective(eye, center, [0.0, 1.0, 0.0], fov, aspect, near, far)
+        camera_at(&self.compressed, [azimuth, elevation], radius, fov, size, 2.01)
     }
 }
 

@@ -26,7 +26,7 @@ use sequence::{Sequence, Subject};
 use support::{Failure, Gpu};
 
 /// Kinds of volumes, in turn.
-const KINDS: [&str; 11] = [
+const KINDS: [&str; 9] = [
     "turbulence",
     "mixing-layer",
     "blobs",
@@ -36,8 +36,6 @@ const KINDS: [&str; 11] = [
     "gyroid",
     "rough-solid",
     "labels",
-    "rods",
-    "brain-part",
 ];
 
 /// Writes frames for training the in-fill network.
@@ -61,7 +59,7 @@ struct Arguments {
     /// Everything random follows from it.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Kinds of volumes, in turn.
+    /// Kinds of volumes, in turn; besides these there are `rods` and `brain-part`.
     #[arg(long, value_delimiter = ',', default_values_t = KINDS.map(String::from))]
     kinds: Vec<String>,
     /// Part of an adapter's name.
@@ -70,13 +68,7 @@ struct Arguments {
 }
 
 fn main() {
-    tracing_subscriber::fmt()
-        .with_env_filter(tracing_subscriber::EnvFilter::from_default_env())
-        .init();
-    if let Err(error) = run(&Arguments::parse()) {
-        eprintln!("infill_dataset: {error}");
-        std::process::exit(1);
-    }
+    support::main("infill_dataset", || run(&Arguments::parse()));
 }
 
 fn run(arguments: &Arguments) -> Result<(), Failure> {

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use crate::subject::Motion;
 use crate::support::shown::Shown;
-use crate::support::{Table, median};
+use crate::support::{Table, distinct, mean, median};
 
 /// Measures of one picture.
 #[derive(Clone, Debug)]
@@ -76,22 +76,6 @@ impl Frame {
             completeness_pixels,
         }
     }
-}
-
-/// Mean of the finite values.
-fn mean(values: impl Iterator<Item = Option<f64>>) -> Option<f64> {
-    let finite: Vec<f64> = values.flatten().filter(|v| v.is_finite()).collect();
-    (!finite.is_empty()).then(|| finite.iter().sum::<f64>() / finite.len() as f64)
-}
-
-fn distinct<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<T> {
-    let mut found = Vec::new();
-    for value in values {
-        if !found.contains(&value) {
-            found.push(value);
-        }
-    }
-    found
 }
 
 impl Row {

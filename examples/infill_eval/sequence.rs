@@ -9,8 +9,8 @@ use crate::rows::{Frame, Row};
 use crate::subject::{Motion, Subject};
 #[cfg(feature = "published-network")]
 use crate::support::published::PublishedNetwork;
-use crate::support::shown::{Shown, holes, nearest};
-use crate::support::{Failure, Gpu, read_words};
+use crate::support::shown::{self, Shown, holes, nearest};
+use crate::support::{Failure, Gpu};
 
 /// The renderers for one volume.
 pub struct Sequence {
@@ -88,7 +88,7 @@ impl Sequence {
                 .map(|contender| contender.cut(gpu, camera, isovalue, cut))
                 .collect::<Result<Vec<_>, _>>()?;
             let holes = holes(&cuts[0].capture);
-            if cuts.iter().any(|c| crate::support::shown::holes(&c.capture) != holes) {
+            if cuts.iter().any(|c| shown::holes(&c.capture) != holes) {
                 return Err("the renderers have finished different pixels".into());
             }
             let new_start = last_isovalue != Some(isovalue);
@@ -155,11 +155,7 @@ impl Sequence {
     #[cfg(feature = "published-network")]
     fn published(&self, gpu: &Gpu, new_start: bool) -> Result<Option<Made>, Failure> {
         let Some(network) = &self.published else { return Ok(None) };
-        if new_start {
-            network.clear(gpu)?;
-        }
-        let ms = network.fill(gpu)?;
-        let shown = Shown::from_words(&read_words(gpu, network.output())?);
+        let (shown, ms) = network.picture(gpu, new_start)?;
         Ok(Some(Made { method: "published", shown, ms, bytes: network.bytes }))
     }
 

@@ -2,7 +2,7 @@
 
 use progressive_iso::{Camera, CompressedVolume};
 
-use crate::support::Failure;
+use crate::support::{Failure, camera_at};
 
 /// Volumes that no training picture shows: the bundled scan, kinds that were never trained on, and other seeds of kinds
 /// that were. With each the radius, as a share of the volume's own, of the ball that the camera holds in the picture: so
@@ -80,16 +80,12 @@ impl Subject {
 
     /// Camera and isovalue of a frame.
     pub fn view(&self, motion: Motion, frame: u32, frames: u32, size: [u32; 2]) -> (Camera, f32) {
-        let (center, radius) = self.volume.bounding_ball();
-        let azimuth = (FIRST_AZIMUTH_DEGREES + motion.degrees() * f64::from(frame)).to_radians();
-        let elevation = ELEVATION_DEGREES.to_radians();
-        let distance = self.closeness * radius / (FIELD_OF_VIEW_DEGREES.to_radians() / 2.0).sin();
-        let away =
-            [azimuth.sin() * elevation.cos(), elevation.sin(), azimuth.cos() * elevation.cos()];
-        let eye = [0, 1, 2].map(|axis| center[axis] + distance * away[axis]);
-        let aspect = f64::from(size[0]) / f64::from(size[1]);
-        let (up, fov, near, far) = ([0.0, 1.0, 0.0], FIELD_OF_VIEW_DEGREES, 0.01, 4.0);
-        let camera = Camera::perspective(eye, center, up, fov, aspect, near * radius, far * radius);
+        let (_, radius) = self.volume.bounding_ball();
+        let azimuth = FIRST_AZIMUTH_DEGREES + motion.degrees() * f64::from(frame);
+        let fov = FIELD_OF_VIEW_DEGREES;
+        let distance = self.closeness * radius / (fov.to_radians() / 2.0).sin();
+        let angles = [azimuth, ELEVATION_DEGREES];
+        let camera = camera_at(&self.volume, angles, distance, fov, size, 4.0);
         let jumped = motion == Motion::IsovalueJump && 2 * frame >= frames;
         (camera, self.isovalue * if jumped { JUMP } else { 1.0 })
     }

@@ -230,13 +230,7 @@ impl Row {
 }
 
 fn main() {
-    tracing_subscriber::fmt()
-        .with_env_filter(tracing_subscriber::EnvFilter::from_default_env())
-        .init();
-    if let Err(error) = run(&Arguments::parse()) {
-        eprintln!("infill_time: {error}");
-        std::process::exit(1);
-    }
+    support::main("infill_time", || run(&Arguments::parse()));
 }
 
 fn run(arguments: &Arguments) -> Result<(), Failure> {

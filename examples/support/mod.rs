@@ -14,7 +14,9 @@ pub mod subject;
 use std::path::Path;
 
 pub use origin::Origin;
-use progressive_iso::{Capture, PassReport, ProgressiveIsoRenderer, wgpu};
+use progressive_iso::{
+    Camera, Capture, CompressedVolume, PassReport, ProgressiveIsoRenderer, wgpu,
+};
 use serde::Serialize;
 pub use table::Table;
 
@@ -25,6 +27,17 @@ pub const UNFINISHED: [f32; 4] = [0.88, 0.91, 0.95, 1.0];
 
 /// Environment variable that names an adapter where no option does.
 pub const ADAPTER_VARIABLE: &str = "PROGRESSIVE_ISO_ADAPTER";
+
+/// Runs a program that logs what the environment asks for, and ends with 1 and what went wrong.
+pub fn main(name: &str, run: impl FnOnce() -> Result<(), Failure>) {
+    tracing_subscriber::fmt()
+        .with_env_filter(tracing_subscriber::EnvFilter::from_default_env())
+        .init();
+    if let Err(error) = run() {
+        eprintln!("{name}: {error}");
+        std::process::exit(1);
+    }
+}
 
 /// A device on one of the adapters.
 pub struct Gpu {
@@ -174,6 +187,43 @@ pub fn median(values: impl Iterator<Item = f64>) -> f64 {
         n if n % 2 == 1 => values[n / 2],
         n => (values[n / 2 - 1] + values[n / 2]) / 2.0,
     }
+}
+
+/// Mean of the finite values, if there are any.
+pub fn mean(values: impl Iterator<Item = Option<f64>>) -> Option<f64> {
+    let finite: Vec<f64> = values.flatten().filter(|v| v.is_finite()).collect();
+    (!finite.is_empty()).then(|| finite.iter().sum::<f64>() / finite.len() as f64)
+}
+
+/// The values in the order in which they come first.
+pub fn distinct<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<T> {
+    let mut found = Vec::new();
+    for value in values {
+        if !found.contains(&value) {
+            found.push(value);
+        }
+    }
+    found
+}
+
+/// The camera of a frame that looks at a volume's middle from a distance in world units, which may be too near to see
+/// all of it; angles in degrees as for [`Camera::orbit`], `far` in radii of the volume's ball.
+pub fn camera_at(
+    volume: &CompressedVolume,
+    [azimuth, elevation]: [f64; 2],
+    distance: f64,
+    fov: f64,
+    size: [u32; 2],
+    far: f64,
+) -> Camera {
+    let (center, radius) = volume.bounding_ball();
+    let (azimuth, elevation) = (azimuth.to_radians(), elevation.to_radians());
+    let level = elevation.cos();
+    let away = [azimuth.sin() * level, elevation.sin(), azimuth.cos() * level];
+    let eye = [0, 1, 2].map(|axis| center[axis] + distance * away[axis]);
+    let aspect = f64::from(size[0]) / f64::from(size[1]);
+    let up = [0.0, 1.0, 0.0];
+    Camera::perspective(eye, center, up, fov, aspect, 0.01 * radius, far * radius)
 }
 
 /// Width and height from `WIDTHxHEIGHT`, for command lines.

@@ -10,7 +10,8 @@ use infill::published::{
 };
 use progressive_iso::{ProgressiveIsoRenderer, wgpu};
 
-use super::{Failure, Gpu};
+use super::shown::Shown;
+use super::{Failure, Gpu, read_words};
 
 /// The network on one picture, which has to have its status.
 pub struct PublishedNetwork {
@@ -44,15 +45,19 @@ impl PublishedNetwork {
         gpu.run(|encoder| self.buffers.record_clear_state(encoder))
     }
 
+    /// Fills the picture as it is now, `anew` without the pictures filled so far: what it shows, and wall milliseconds.
+    pub fn picture(&self, gpu: &Gpu, anew: bool) -> Result<(Shown, f64), Failure> {
+        if anew {
+            self.clear(gpu)?;
+        }
+        let ms = self.fill(gpu)?;
+        Ok((Shown::from_words(&read_words(gpu, self.buffers.output())?), ms))
+    }
+
     /// Fills the picture as it is now: wall milliseconds.
     pub fn fill(&self, gpu: &Gpu) -> Result<f64, Failure> {
         let start = Instant::now();
         gpu.run(|encoder| self.stage.record(encoder, &self.buffers))?;
         Ok(start.elapsed().as_secs_f64() * 1e3)
-    }
-
-    /// Red, green, blue and a word more of every pixel, f32, as the last fill made them.
-    pub fn output(&self) -> &wgpu::Buffer {
-        self.buffers.output()
     }
 }

@@ -74,21 +74,22 @@ impl Weights {
 
     /// The trained weights that come with the crate; `infill/training` says how they were made.
     pub fn trained() -> &'static Self {
-        static TRAINED: LazyLock<Weights> = LazyLock::new(|| {
-            // A test reads them, so that the zeros, with which pixels are filled all the same, are never needed.
-            Weights::from_safetensors(include_bytes!("../weights/infill.safetensors"))
-                .unwrap_or_else(|_| Weights::zero())
-        });
+        static TRAINED: LazyLock<Weights> =
+            LazyLock::new(|| Weights::embedded(include_bytes!("../weights/infill.safetensors")));
         &TRAINED
     }
 
     /// Like [`Self::trained`], trained on the sparse pixels of foveated frames: few neighbours, no rays on their way.
     pub fn trained_sparse() -> &'static Self {
-        static TRAINED: LazyLock<Weights> = LazyLock::new(|| {
-            Weights::from_safetensors(include_bytes!("../weights/sparse.safetensors"))
-                .unwrap_or_else(|_| Weights::zero())
-        });
+        static TRAINED: LazyLock<Weights> =
+            LazyLock::new(|| Weights::embedded(include_bytes!("../weights/sparse.safetensors")));
         &TRAINED
+    }
+
+    /// Those of a file of the crate. A test reads it, so that the zeros, with which pixels are filled all the
+    /// same, are never needed.
+    fn embedded(bytes: &[u8]) -> Self {
+        Self::from_safetensors(bytes).unwrap_or_else(|_| Self::zero())
     }
 
     /// All zero: the filler without a network.

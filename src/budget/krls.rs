@@ -118,17 +118,7 @@ impl<const N: usize> Krls<N> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Numbers from 0 to 1 that look random, the same in every run.
-    fn noise(seed: u64) -> impl FnMut() -> f64 {
-        let mut state = seed;
-        move || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1u64 << 53) as f64
-        }
-    }
+    use crate::budget::noise;
 
     fn cost([x, y]: [f64; 2]) -> f64 {
         (1.3 * x).sin() + 0.5 * y * y

@@ -191,21 +191,12 @@ impl Iterator for Walk {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Numbers from -1 to 1 that look random, the same in every run.
-    fn noise(seed: u64) -> impl FnMut() -> f64 {
-        let mut state = seed;
-        move || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-        }
-    }
+    use crate::budget::noise;
 
     #[test]
     fn a_walk_has_every_cell_along_the_ray_in_order() {
-        let (grid, mut random) = (Grid::new([70, 45, 33]), noise(7));
+        let (grid, mut numbers) = (Grid::new([70, 45, 33]), noise(7));
+        let mut random = move || 2.0 * numbers() - 1.0;
         let mut found = 0;
         for ray in 0..1000 {
             let origin = [0, 0, 0].map(|_| 100.0 * random());
