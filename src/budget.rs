@@ -376,19 +376,14 @@ mod tests {
         budget: &mut Budget,
         frames: u32,
         target_ms: f64,
+        fills: bool,
         cost: impl Fn(f64, u32) -> f64,
     ) -> Vec<(f64, f64)> {
         let frame = |number: u32| {
             let distance = 0.8 + 0.3 * (f64::from(number) * 0.1).sin();
             let view = view(3.0 * f64::from(number), distance);
-            let request = Request {
-                view: &view,
-                size: SIZE,
-                isovalue: 0.5,
-                look_ahead: 2,
-                fills: false,
-                target_ms,
-            };
+            let request =
+                Request { view: &view, size: SIZE, isovalue: 0.5, look_ahead: 2, fills, target_ms };
             let choice = budget.choose(&request);
             let ms = cost(choice.density, number);
             budget.learn(&choice, ms);
@@ -400,7 +395,7 @@ mod tests {
     #[test]
     fn times_come_near_the_target_from_below() {
         let cost = |density: f64, _| 4.0 + 90.0 * density;
-        let shown = show(&mut budget(BudgetMode::Predicted), 120, 30.0, cost);
+        let shown = show(&mut budget(BudgetMode::Predicted), 120, 30.0, false, cost);
         for (i, (density, ms)) in shown.iter().enumerate().skip(20) {
             assert!((22.0..31.0).contains(ms), "frame {i}: {ms} ms with a density of {density}");
         }
@@ -409,7 +404,7 @@ mod tests {
     #[test]
     fn a_density_rises_by_a_quarter_at_most() {
         for mode in [BudgetMode::Predicted, BudgetMode::LastFrame] {
-            let shown = show(&mut budget(mode), 60, 1e6, |density, _| 100.0 * density);
+            let shown = show(&mut budget(mode), 60, 1e6, false, |density, _| 100.0 * density);
             for pair in shown.windows(2) {
                 assert!(pair[1].0 <= pair[0].0 / MOST_STEP * (1.0 + 1e-9), "{mode:?}: {pair:?}");
             }
@@ -420,9 +415,19 @@ mod tests {
     #[test]
     fn what_does_not_fit_gets_the_least_density() {
         for mode in [BudgetMode::Predicted, BudgetMode::LastFrame] {
-            let shown = show(&mut budget(mode), 30, 1e-3, |density, _| 100.0 * density);
+            let shown = show(&mut budget(mode), 30, 1e-3, false, |density, _| 100.0 * density);
             assert!((shown[29].0 - LEAST_DENSITY).abs() < 1e-3, "{mode:?}: {:?}", shown[29]);
         }
+    }
+
+    #[test]
+    fn what_takes_as_long_with_fewer_rays_is_tried_with_fewer_all_the_same() {
+        // As where filling takes as long as casting: rises again from the least density, too.
+        let mut budget = budget(BudgetMode::Predicted);
+        show(&mut budget, 40, 200.0, true, |density, _| 110.0 - 10.0 * density);
+        let shown = show(&mut budget, 20, 50.0, true, |density, _| 110.0 - 10.0 * density);
+        let least = shown.iter().map(|shown| shown.0).fold(1.0, f64::min);
+        assert!(least <= LEAST_DENSITY * 1.01, "{shown:?}");
     }
 
     #[test]
@@ -432,7 +437,7 @@ mod tests {
             let cost = |density: f64, number| {
                 if (10..20).contains(&number) { broken } else { 100.0 * density }
             };
-            let shown = show(&mut budget, 40, 20.0, cost);
+            let shown = show(&mut budget, 40, 20.0, false, cost);
             assert!(shown[9].0 < 0.5, "{shown:?}");
             for (density, _) in &shown[13..20] {
                 assert_eq!(density.to_bits(), 1.0_f64.to_bits(), "{broken}: {shown:?}");
