@@ -486,14 +486,15 @@ fn infill_is_left_out_where_every_ray_ends_in_the_first_pass() {
     let part = |renderer: &ProgressiveIsoRenderer| {
         let parts = renderer.plan().parts();
         let part = parts.iter().find(|part| part.name == "infill").unwrap();
-        (part.included, part.why.clone())
+        (part.included, part.why.clone(), part.bytes)
     };
 
     let mut without = gpu.renderer(&scene, full(None));
     let plain = frame_with(&scene, 20.0, Infill::Off);
     let expected = gpu.finish(&mut without, &plain);
     let mut renderer = gpu.renderer(&scene, full(Some(usual)));
-    assert_eq!(part(&renderer), (false, "every block is resident: nothing to fill".into()));
+    let left_out = "every block is resident: nothing to fill";
+    assert_eq!(part(&renderer), (false, left_out.into(), 0));
     assert_eq!(renderer.plan().bytes(), without.plan().bytes(), "it costs no byte");
     assert_eq!(gpu.finish(&mut renderer, &frame).color, expected.color);
     let (report, plain) = (renderer.poll_report(), without.poll_report());
@@ -506,6 +507,8 @@ fn infill_is_left_out_where_every_ray_ends_in_the_first_pass() {
         renderer.set_options(&gpu.device, with).unwrap();
         assert!(part(&renderer).0 && renderer.plan().bytes() > without.plan().bytes());
         assert_eq!(gpu.finish(&mut renderer, &frame).color, expected.color);
+        let bytes = renderer.poll_report().bytes;
+        assert!(bytes >= plain.bytes + part(&renderer).2, "it has its memory: {bytes}");
         renderer.set_options(&gpu.device, full(Some(usual))).unwrap();
         assert!(!part(&renderer).0);
         assert_eq!(gpu.finish(&mut renderer, &frame).color, expected.color);
