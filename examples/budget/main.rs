@@ -17,8 +17,8 @@ mod support;
 use std::path::PathBuf;
 
 use clap::{Parser, ValueEnum};
-use measure::{MODES, Row, Shown};
-use progressive_iso::CompressedVolume;
+use measure::{MODES, Row, Show, Shown};
+use progressive_iso::{CompressedVolume, Infill};
 use serde::Serialize;
 use support::plot::{Axis, Lines, Scale, Series};
 use support::subject::{BRAIN, Subject, cube, turbulence};
@@ -49,6 +49,9 @@ struct Arguments {
     /// Milliseconds that a frame should take; half the median full frame's without.
     #[arg(long)]
     target_ms: Option<f64>,
+    /// Leaves the pixels without a ray as they are.
+    #[arg(long)]
+    no_infill: bool,
     /// Only volumes whose name contains this.
     #[arg(long)]
     volume: Option<String>,
@@ -114,10 +117,11 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     for subject in arguments.set.subjects().iter().filter(|s| s.name().contains(wanted)) {
         let (stream, isovalue) = support::subject::stream(subject)?;
         let volume = CompressedVolume::try_from(&stream)?;
+        let infill = if arguments.no_infill { Infill::Off } else { Infill::Classical };
+        let show = Show { volume: &volume, isovalue, size, infill };
         for &seconds in arguments.set.seconds() {
             let views = sequence::record(seconds, SEED);
-            let (shown, target_ms) =
-                measure::run(adapter, &volume, isovalue, &views, size, arguments.target_ms)?;
+            let (shown, target_ms) = measure::run(adapter, &show, &views, arguments.target_ms)?;
             let name = format!("{}-{seconds}s", subject.name());
             let chart = chart(&name, &shown, target_ms);
             let path = arguments.out.join(format!("budget-{name}.svg"));

@@ -57,46 +57,51 @@ pub struct Row {
     pub most_budget_ms: f64,
 }
 
-fn frame(
-    volume: &CompressedVolume,
-    view: &View,
-    isovalue: f32,
-    size: [u32; 2],
-    target_ms: f64,
-) -> Frame {
-    let options = FrameOptions {
-        target_ms: Some(target_ms as f32),
-        infill: Infill::Classical,
-        pass_ms: f32::INFINITY,
-        ..Default::default()
-    };
-    Frame {
-        camera: view.camera(volume, size),
-        isovalues: vec![isovalue * view.isovalue as f32],
-        options,
+/// What is shown, and how.
+#[derive(Clone, Copy)]
+pub struct Show<'a> {
+    pub volume: &'a CompressedVolume,
+    pub isovalue: f32,
+    pub size: [u32; 2],
+    pub infill: Infill,
+}
+
+impl Show<'_> {
+    fn frame(&self, view: &View, target_ms: f64) -> Frame {
+        let options = FrameOptions {
+            target_ms: Some(target_ms as f32),
+            infill: self.infill,
+            pass_ms: f32::INFINITY,
+            ..Default::default()
+        };
+        Frame {
+            camera: view.camera(self.volume, self.size),
+            isovalues: vec![self.isovalue * view.isovalue as f32],
+            options,
+        }
     }
 }
 
 fn renderer(
     gpu: &Gpu,
-    volume: &CompressedVolume,
-    size: [u32; 2],
+    show: &Show<'_>,
     mode: BudgetMode,
 ) -> Result<ProgressiveIsoRenderer, Failure> {
     let sources = InfillSources { neighbours: true, coarse_field: false, history: false };
     let options = RendererOptions {
-        size,
+        size: show.size,
         budget_bytes: BUDGET_BYTES,
         infill: Some(InfillOptions { sources, ..Default::default() }),
         budget: Some(mode),
         ..Default::default()
     };
     let mut renderer =
-        ProgressiveIsoRenderer::new(&gpu.device, &gpu.queue, volume.clone(), options)?;
+        ProgressiveIsoRenderer::new(&gpu.device, &gpu.queue, show.volume.clone(), options)?;
     let view = crate::sequence::record(1, 0)[0];
     // Loads the volume and warms the driver.
+    let empty = Show { isovalue: 1e-3, ..*show };
     for _ in 0..2 {
-        renderer.set_frame(&frame(volume, &view, 1e-3, size, 1e6))?;
+        renderer.set_frame(&empty.frame(&view, 1e6))?;
         renderer.render_to_completion(&gpu.device, &gpu.queue, |_, _| true)?;
     }
     Ok(renderer)
@@ -133,16 +138,14 @@ fn show(
 /// Shows a recording in all modes; the frames of each, and the target.
 pub fn run(
     adapter: Option<&str>,
-    volume: &CompressedVolume,
-    isovalue: f32,
+    scene: &Show<'_>,
     views: &[View],
-    size: [u32; 2],
     target_ms: Option<f64>,
 ) -> Result<(Vec<Vec<Shown>>, f64), Failure> {
     // Each has a device of its own: some drivers keep a limited number of compiled shaders for each.
     let of = |(_, mode): &(_, BudgetMode)| {
         let gpu = Gpu::new(adapter)?;
-        let renderer = renderer(&gpu, volume, size, *mode)?;
+        let renderer = renderer(&gpu, scene, *mode)?;
         Ok((gpu, renderer))
     };
     let mut renderers = MODES.iter().map(of).collect::<Result<Vec<_>, Failure>>()?;
@@ -150,7 +153,7 @@ pub fn run(
         Some(target_ms) => target_ms,
         None => {
             let full = views.iter().step_by(EVERY).map(|view| {
-                let frame = frame(volume, view, isovalue, size, 1e6);
+                let frame = scene.frame(view, 1e6);
                 let (gpu, renderer) = &mut renderers[0];
                 Ok(show(gpu, renderer, &frame, 1)?.ms)
             });
@@ -159,7 +162,7 @@ pub fn run(
     };
     let mut shown = vec![Vec::new(); MODES.len()];
     for view in views {
-        let frame = frame(volume, view, isovalue, size, target_ms);
+        let frame = scene.frame(view, target_ms);
         for (((gpu, renderer), shown), (_, mode)) in renderers.iter_mut().zip(&mut shown).zip(MODES)
         {
             let passes = if mode == BudgetMode::TwoPass { 2 } else { 1 };
