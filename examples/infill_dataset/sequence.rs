@@ -336,14 +336,14 @@ impl Sequence {
             history,
             sources: Sources::default(),
         };
-        let pyramid = scene.pyramid();
+        let surroundings = scene.surroundings();
         let pixel = |(i, pixel): (usize, &[u32; 2])| {
             let direction = FrameRay::new(&view.params, *pixel).ray.direction;
             let to_viewer = shading::to_viewer(&view.shading, direction);
             let truth = values(shown[i], to_viewer);
             match known[i] {
                 Some(_) => finished_pixel(values(known[i], to_viewer), truth),
-                None => hole(&scene.candidates(pyramid.as_ref(), *pixel), to_viewer, truth),
+                None => hole(&scene.candidates(&surroundings, *pixel), to_viewer, truth),
             }
         };
         all.iter().enumerate().map(pixel).collect()

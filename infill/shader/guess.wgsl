@@ -34,7 +34,7 @@
 
 const LIST: u32 = 0u;
 
-fn guess(pixel: vec2<u32>, number: u32, inside: vec2<u32>) -> vec3<u32> {
+fn guess(pixel: vec2<u32>, number: u32, inside: vec2<u32>, share: f32) -> vec3<u32> {
     let ray = frame_ray(frame, pixel).ray;
     let to_viewer = shading_to_viewer(ray.direction);
     let t_low = infill_t_low(ray, number);
@@ -49,7 +49,7 @@ fn guess(pixel: vec2<u32>, number: u32, inside: vec2<u32>) -> vec3<u32> {
 #endif
 #ifdef COARSE_FIELD
     let most_steps = MARCH_MOST_STEPS + frame_zero(number);
-    let march = march(ray, infill_volume(), t_low, frame.isovalue, most_steps);
+    let march = march(ray, infill_volume(), t_low, frame.isovalue, share, most_steps);
     let miss = candidate_pack(0.0, vec3<f32>(0.0), 0.0);
     words.y = miss;
     words.z = miss;
@@ -77,12 +77,13 @@ fn main(
 #ifdef NEIGHBOURS
     pull_tile(corner, lane);
 #endif
+    let share = infill_share(tiles[TILES_SHARES], tiles[TILES_SAMPLES]);
     for (var i = lane; i < INFILL_TILE * INFILL_TILE; i += 64u) {
         let inside = vec2<u32>(i % INFILL_TILE, i / INFILL_TILE);
         let pixel = corner + inside;
         let number = frame_number(frame, pixel);
         if (listed && all(pixel < params.size) && infill_is_hole(number)) {
-            let words = guess(pixel, number, inside);
+            let words = guess(pixel, number, inside, share);
             let first = 3u * infill_pixel_index(params, pixel);
             candidates[first] = words.x;
             candidates[first + 1u] = words.y;

@@ -23,6 +23,8 @@
 @group(0) @binding(9) var<storage, read> codes_2: array<u32>;
 #endif
 
+// Of a block's range: what the pictures say of it is summed when they are filled, not before a round.
+const MIDPOINT: f32 = 0.5;
 // Active blocks of a ray that are requested at a time.
 const MOST_BLOCKS: u32 = 16u;
 
@@ -69,7 +71,7 @@ fn main(
     let zero = frame_zero(number);
     let ray = frame_ray(frame, frame_pixel(frame, number)).ray;
     let t_low = infill_t_low(ray, number);
-    let march = march(ray, infill_volume(), t_low, frame.isovalue, MARCH_MOST_STEPS + zero);
+    let march = march(ray, infill_volume(), t_low, frame.isovalue, MIDPOINT, MARCH_MOST_STEPS + zero);
     if (any(march.hit)) {
         let first = frame_unpack(frame, rays[RAYS_HEADER + number]);
         guide(ray, first, select(march.t.y, march.t.x, march.hit.x), MOST_BLOCKS + zero);

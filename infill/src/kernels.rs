@@ -46,6 +46,7 @@ const MARK: Module = entry!("mark");
 const TILES: Module = entry!("tiles");
 const TILE_ARGS: Module = entry!("tile_args");
 const PUSH: Module = entry!("push");
+const CALIBRATE: Module = entry!("calibrate");
 const GUESS: Module = entry!("guess");
 const ENCODE: Module = entry!("encode");
 const PAIR: Module = entry!("pair");
@@ -148,6 +149,12 @@ pub(crate) fn tile_args() -> KernelSource {
 pub(crate) fn push() -> KernelSource {
     let averages = Binding::StorageReadWrite { min_bytes: 16 };
     source("infill.push", PUSH, vec![FRAME, PARAMS, READ, READ, averages, TEXTURE, TEXTURE], &[])
+}
+
+pub(crate) fn calibrate(plan: &InfillPlan) -> KernelSource {
+    let mut bindings = vec![FRAME, PARAMS, READ, READ_WRITE, TEXTURE, TEXTURE, PAIRS];
+    bindings.extend(vec![READ; plan.code_pages()]);
+    source("infill.calibrate", CALIBRATE, bindings, &code_page_constants(plan))
 }
 
 pub(crate) fn guess(plan: &InfillPlan) -> KernelSource {

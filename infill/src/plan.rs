@@ -20,7 +20,7 @@ const MOST_CODE_PAGES: usize = 3;
 
 /// Lists of tiles: those with holes, with their neighbours, and those within two tiles.
 pub(crate) const LISTS: u64 = 3;
-const TILES_HEADER_WORDS: u64 = 4;
+const TILES_HEADER_WORDS: u64 = 6;
 
 /// Bytes of the arguments of dispatches over the lists, and over the rays' active bits.
 pub(crate) const ARGS_BYTES: u64 = 16 * LISTS;

@@ -36,6 +36,7 @@ pub struct Infill {
     tiles: Kernel,
     tile_args: Kernel,
     push: Option<Kernel>,
+    calibrate: Option<Kernel>,
     guess: Kernel,
     classical: Kernel,
     network: Option<NetworkKernels>,
@@ -63,6 +64,7 @@ pub struct InfillBuffers {
     tile_lists: wgpu::BindGroup,
     tile_args: wgpu::BindGroup,
     push: Option<wgpu::BindGroup>,
+    calibrate: Option<wgpu::BindGroup>,
     guess: wgpu::BindGroup,
     classical: wgpu::BindGroup,
     network: Option<NetworkBinds>,
@@ -109,6 +111,7 @@ impl Infill {
             tiles: make(kernels::tiles()),
             tile_args: make(kernels::tile_args()),
             push: sources.neighbours.then(|| make(kernels::push())),
+            calibrate: sources.coarse_field.then(|| make(kernels::calibrate(plan))),
             guess: make(kernels::guess(plan)),
             classical: make(kernels::fill(plan, false)),
             network: plan.network().then(|| NetworkKernels {
@@ -126,6 +129,7 @@ impl Infill {
             vec![kernels::gate(), kernels::mark(), kernels::tiles(), kernels::tile_args()];
         all.extend(sources.history.then(kernels::scatter));
         all.extend(sources.neighbours.then(kernels::push));
+        all.extend(sources.coarse_field.then(|| kernels::calibrate(plan)));
         all.extend([kernels::guess(plan), kernels::fill(plan, false)]);
         if plan.network() {
             all.push(kernels::encode(plan));
@@ -189,6 +193,9 @@ impl Infill {
         };
         if let (Some(kernel), Some(bind)) = (&self.push, &buffers.push) {
             over(&mut begin_pass(encoder, "infill.push"), kernel, bind, 1);
+        }
+        if let (Some(kernel), Some(bind)) = (&self.calibrate, &buffers.calibrate) {
+            over(&mut begin_pass(encoder, "infill.calibrate"), kernel, bind, 1);
         }
         over(&mut begin_pass(encoder, "infill.guess"), &self.guess, &buffers.guess, 0);
         match (method, &self.network, &buffers.network) {
@@ -322,9 +329,16 @@ impl Maker<'_> {
                 tiles.as_entire_binding(),
                 shared.as_entire_binding(),
             ],
-            &[depth, normals.clone()],
+            &[depth.clone(), normals.clone()],
         ]
         .concat();
+        let coarse_field = || {
+            let mut buffers = vec![ranges.coarse_ranges().as_entire_binding()];
+            buffers.extend(ranges.code_pages().iter().map(|page| page.as_entire_binding()));
+            buffers
+        };
+        let mut calibrate = mark.clone();
+        calibrate.extend([depth, normals.clone()]);
         let pixel = vec![
             rays.frame().as_entire_binding(),
             rays.shading().as_entire_binding(),
@@ -336,8 +350,8 @@ impl Maker<'_> {
         let mut guess = pixel.clone();
         guess.extend(plan.sources().neighbours.then(|| shared.as_entire_binding()));
         if plan.sources().coarse_field {
-            guess.push(ranges.coarse_ranges().as_entire_binding());
-            guess.extend(ranges.code_pages().iter().map(|page| page.as_entire_binding()));
+            guess.extend(coarse_field());
+            calibrate.extend(coarse_field());
         }
         let mut fill = pixel.clone();
         fill.extend([normals.clone(), wgpu::BindingResource::TextureView(textures.color_view())]);
@@ -383,6 +397,8 @@ impl Maker<'_> {
             tile_lists: bind(&stage.tiles, "infill.tiles", &lists),
             tile_args: bind(&stage.tile_args, "infill.tile_args", &counts),
             push: stage.push.as_ref().map(|kernel| bind(kernel, "infill.push", &push)),
+            calibrate: (stage.calibrate.as_ref())
+                .map(|kernel| bind(kernel, "infill.calibrate", &calibrate)),
             guess: bind(&stage.guess, "infill.guess", &guess),
             classical: bind(&stage.classical, "infill.fill.classical", &fill),
             network,

@@ -16,9 +16,22 @@ struct InfillParams {
 const INFILL_TILE: u32 = 16u; // pixels
 
 // The tiles' buffer: number of tiles with holes, of those and their neighbours, and of those within two tiles of
-// holes; pixels filled; a bit for every tile with holes; the three lists.
+// holes; pixels filled; sum and number of the shares of calibrate.wgsl; a bit for every tile with holes; the three lists.
 const TILES_FILLED: u32 = 3u;
-const TILES_HEADER: u32 = 4u;
+const TILES_SHARES: u32 = 4u;
+const TILES_SAMPLES: u32 = 5u;
+const TILES_HEADER: u32 = 6u;
+
+// Of a share in the sum, which has room for a quarter of the pixels of the largest picture.
+const TILES_SHARE_STEPS: f32 = 128.0;
+const TILES_NO_SHARE: u32 = 0xffffffffu;
+// Samples that a share of one half counts for, so that a few hits do not decide.
+const TILES_PRIOR_SAMPLES: f32 = 16.0;
+
+// Share of the way from the lower to the upper end of a block's range at which the surface lies.
+fn infill_share(sum: u32, samples: u32) -> f32 {
+    return (f32(sum) / TILES_SHARE_STEPS + 0.5 * TILES_PRIOR_SAMPLES) / (f32(samples) + TILES_PRIOR_SAMPLES);
+}
 
 fn infill_flag_words(params: InfillParams) -> u32 {
     return (params.tiles.x * params.tiles.y + 31u) / 32u;

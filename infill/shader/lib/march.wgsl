@@ -4,12 +4,9 @@
 const MARCH_FIRST_STEP: f32 = 2.0;          // voxels: half a block
 const MARCH_STEP_GROWTH: f32 = 0.0078125;   // per voxel from the start
 const MARCH_MOST_STEPS: u32 = 512u;         // farther than any volume that can be rendered is deep
-const MARCH_MIDPOINT: f32 = 0.5;            // of a block's range
-// For thin features: closer to the end on the side that the ray looks for.
-const MARCH_TOWARDS_HIGH: f32 = 0.75;
-const MARCH_TOWARDS_LOW: f32 = 0.25;
 
-// First crossings of the field of midpoints (x) and of the one that favours thin features (y).
+// First crossings of the field at a share of the blocks' ranges (x) and of the one that favours thin features (y): halfway to
+// the end on the side that the ray looks for.
 struct March {
     hit: vec2<bool>,
     t: vec2<f32>,
@@ -20,13 +17,13 @@ fn march_at(ray: DdaRay, t: f32) -> CoarseSample {
     return coarse_at(ray.origin + t * ray.direction);
 }
 
-// From t_low on. The side on which the ray starts is that of the midpoints where it enters the volume; up to t_low it
+// From t_low on. The side on which the ray starts is that of the first field where it enters the volume; up to t_low it
 // has not changed sides.
-fn march(ray: DdaRay, volume: DdaBox, t_low: f32, isovalue: f32, most_steps: u32) -> March {
+fn march(ray: DdaRay, volume: DdaBox, t_low: f32, isovalue: f32, share: f32, most_steps: u32) -> March {
     let entry = dda_entry(ray, volume).t;
     let exit = dda_exit(ray, volume).t;
-    let inside = coarse_values(march_at(ray, entry), vec2<f32>(MARCH_MIDPOINT)).x >= isovalue;
-    let shares = vec2<f32>(MARCH_MIDPOINT, select(MARCH_TOWARDS_HIGH, MARCH_TOWARDS_LOW, inside));
+    let inside = coarse_values(march_at(ray, entry), vec2<f32>(share)).x >= isovalue;
+    let shares = vec2<f32>(share, 0.5 * (share + select(1.0, 0.0, inside)));
     var march = March(vec2<bool>(false), vec2<f32>(0.0), shares);
     var t = t_low;
     var before = t_low;

@@ -49,6 +49,14 @@ pub struct Scene<'a> {
     pub sources: Sources,
 }
 
+/// What finished pixels tell about holes: of the sources that are used.
+#[derive(Debug)]
+pub struct Surroundings<'a> {
+    pyramid: Option<Pyramid>,
+    /// The coarse field and the share of the blocks' ranges at which the surface lies.
+    field: Option<(&'a CoarseField, f32)>,
+}
+
 /// The candidates of a hole in the order of [`crate::options::Source`].
 pub type Candidates = [Option<Candidate>; 4];
 
@@ -73,26 +81,35 @@ impl Scene<'_> {
         }
     }
 
-    /// What is known of the surroundings, if that is used.
-    pub fn pyramid(&self) -> Option<Pyramid> {
-        self.sources.neighbours.then(|| Pyramid::new(self.size(), |pixel| self.average(pixel)))
+    /// What finished pixels tell about holes.
+    pub fn surroundings(&self) -> Surroundings<'_> {
+        let field = self.field.filter(|_| self.sources.coarse_field);
+        Surroundings {
+            pyramid: self
+                .sources
+                .neighbours
+                .then(|| Pyramid::new(self.size(), |pixel| self.average(pixel))),
+            field: field.map(|field| (field, self.share(field))),
+        }
     }
 
     /// The candidates of a hole.
-    pub fn candidates(&self, pyramid: Option<&Pyramid>, pixel: [u32; 2]) -> Candidates {
+    pub fn candidates(&self, surroundings: &Surroundings<'_>, pixel: [u32; 2]) -> Candidates {
         let frame_ray = FrameRay::new(self.frame, pixel);
         let ray = &frame_ray.ray;
         let to_viewer = shading::to_viewer(self.shading, ray.direction);
         let t_low = self.t_low[self.index(pixel)];
         let neighbours =
-            pyramid.map(|p| p.at(pixel)).filter(|a| a.weight > 0.0).map(|a| Candidate {
-                coverage: a.coverage / a.weight,
-                normal: shading::safe_normalize(a.normal, to_viewer),
-                distance: if a.coverage > 0.0 { a.t / a.coverage - t_low } else { 0.0 },
-            });
+            surroundings.pyramid.as_ref().map(|p| p.at(pixel)).filter(|a| a.weight > 0.0).map(
+                |a| Candidate {
+                    coverage: a.coverage / a.weight,
+                    normal: shading::safe_normalize(a.normal, to_viewer),
+                    distance: if a.coverage > 0.0 { a.t / a.coverage - t_low } else { 0.0 },
+                },
+            );
         let miss = Candidate { coverage: 0.0, normal: [0.0; 3], distance: 0.0 };
-        let coarse = self.field.filter(|_| self.sources.coarse_field).map(|field| {
-            march(&self.grid, field, ray, t_low, self.frame.isovalue()).map(|hit| {
+        let coarse = surroundings.field.map(|(field, share)| {
+            march(&self.grid, field, ray, t_low, self.frame.isovalue(), share).map(|hit| {
                 hit.map_or(miss, |hit| Candidate {
                     coverage: 1.0,
                     normal: shading::normal(self.shading, hit.gradient, to_viewer),
@@ -198,7 +215,7 @@ impl Scene<'_> {
     /// Fills every hole.
     pub fn fill(&self, weights: &Weights) -> Fill {
         let size = self.size();
-        let pyramid = self.pyramid();
+        let surroundings = self.surroundings();
         let all = || (0..size[0] * size[1]).map(|i| [i % size[0], i / size[0]]);
         let to_viewer = |pixel| {
             shading::to_viewer(self.shading, FrameRay::new(self.frame, pixel).ray.direction)
@@ -208,7 +225,7 @@ impl Scene<'_> {
             .map(|(pixel, finished)| {
                 let hole = finished.is_none();
                 hole.then(|| {
-                    let candidates = self.candidates(pyramid.as_ref(), pixel);
+                    let candidates = self.candidates(&surroundings, pixel);
                     candidates.map(|c| Candidate::unpack(Candidate::pack(c)))
                 })
             })

@@ -1,4 +1,4 @@
-//! Twin of `shader/march.wgsl`: the unfinished rays through the coarse field.
+//! Twin of `shader/lib/march.wgsl`: the unfinished rays through the coarse field.
 
 use macrocell::Grid;
 use macrocell::cpu::dda::{CellBox, Ray};
@@ -12,12 +12,6 @@ const STEP_GROWTH: f32 = 1.0 / 128.0;
 /// Most steps of a ray; with growing steps they lead farther than any volume that can be rendered is deep.
 const MOST_STEPS: u32 = 512;
 
-/// Share of the way from the lower to the upper end of a block's range that stands for the block.
-const MIDPOINT: f32 = 0.5;
-/// For thin features: closer to the end on the side that the ray looks for.
-const TOWARDS_HIGH: f32 = 0.75;
-const TOWARDS_LOW: f32 = 0.25;
-
 /// Where a ray crosses a coarse field.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CoarseHit {
@@ -27,9 +21,10 @@ pub struct CoarseHit {
     pub gradient: [f32; 3],
 }
 
-/// First crossings of the field of midpoints and of the field that favours thin features, from `t_low` on.
+/// First crossings of the field at a share of the way from the lower to the upper end of the blocks' ranges, and of the field
+/// that favours thin features, halfway to the end on the side that the ray looks for; from `t_low` on.
 ///
-/// The side on which the ray starts is that of the midpoints where it enters the volume; up to `t_low` it has
+/// The side on which the ray starts is that of the first field where it enters the volume; up to `t_low` it has
 /// not changed sides.
 pub fn march(
     grid: &Grid,
@@ -37,12 +32,13 @@ pub fn march(
     ray: &Ray,
     t_low: f32,
     isovalue: f32,
+    share: f32,
 ) -> [Option<CoarseHit>; 2] {
     let volume = CellBox { low: [0; 3], high: grid.last_cell() };
     let (entry, exit) = (ray.entry(volume).t, ray.exit(volume).t);
     let at = |t: f32| field.at(std::array::from_fn(|a| ray.origin[a] + t * ray.direction[a]));
-    let inside = at(entry).value(MIDPOINT) >= isovalue;
-    let shares = [MIDPOINT, if inside { TOWARDS_LOW } else { TOWARDS_HIGH }];
+    let inside = at(entry).value(share) >= isovalue;
+    let shares = [share, 0.5 * (share + if inside { 0.0 } else { 1.0 })];
     let mut hits = [None; 2];
     let (mut t, mut before) = (t_low, t_low);
     let mut values_before = [0.0; 2];

@@ -1,5 +1,6 @@
 //! The filler on the CPU: twins of the kernels, dense, for tests and for making training data.
 
+mod calibrate;
 pub mod candidate;
 pub mod field;
 pub mod fill;
