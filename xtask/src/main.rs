@@ -102,14 +102,19 @@ fn test(arguments: &[String]) -> Result<(), String> {
     if arguments.is_empty() { web(&["--test".to_owned()]) } else { Ok(()) }
 }
 
+/// The test programs whose results depend on the driver, apart from those of the libraries: neither documentation nor
+/// files nor the options of the example programs bring anything new on another one.
+const DRIVER_TESTS: [&str; 8] =
+    ["it", "published", "shaders", "gpu_*", "vectors", "large", "blue_noise", "session"];
+
 fn test_second_driver(arguments: &[String]) -> Result<(), String> {
     let Some(icd) = adapter::swiftshader_icd() else {
         println!("{}", adapter::NO_SECOND_DRIVER);
         return Ok(());
     };
     println!("second adapter: {}", adapter::describe(&adapter::only(&icd))?);
-    // Documentation tests bring nothing new on another driver.
     let mut cargo = process::cargo();
-    cargo.args(["test", "--workspace", "--features", FEATURES, "--tests"]).args(arguments);
+    cargo.args(["test", "--workspace", "--features", FEATURES, "--lib"]);
+    cargo.args(DRIVER_TESTS.iter().flat_map(|&name| ["--test", name])).args(arguments);
     process::run(cargo.envs(adapter::only(&icd)))
 }
