@@ -444,7 +444,8 @@ impl ProgressiveIsoRenderer {
         Self::choose_rays(&mut self.records, &self.options, state, clear);
         let sampling = state.sampling(self.options.size);
         let sampling = sampling.as_ref();
-        rendering.record_start(device, encoder, upload, stages, &params, &shading, sampling);
+        let (textures, view) = (&self.pictures.textures, (&params, &shading));
+        rendering.record_start(device, encoder, upload, stages, textures, view, sampling);
         if let (Some(draw), Some(buffers)) = (&stages.draw, &self.pictures.draw) {
             draw.record_params(device, encoder, upload, buffers, &state.view);
         }

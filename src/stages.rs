@@ -183,11 +183,14 @@ impl Rendering {
         encoder: &mut wgpu::CommandEncoder,
         upload: &mut UploadRing,
         stages: &Stages,
-        params: &FrameParams,
-        shading: &ShadingParams,
+        textures: &OutputTextures,
+        (params, shading): (&FrameParams, &ShadingParams),
         sampling: Option<&SamplingParams>,
     ) {
-        stages.rays.record_start(device, encoder, upload, &self.rays, params, shading, sampling);
+        let rays = &self.rays;
+        stages
+            .rays
+            .record_start(device, encoder, upload, rays, textures, params, shading, sampling);
         self.rounds.record_start(encoder, &stages.rays, &self.rays);
     }
 

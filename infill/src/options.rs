@@ -42,8 +42,8 @@ pub enum Source {
 
 /// Logarithms of the weights that candidates have without a network, in the order of [`Source`]; from that of the
 /// neighbours [`DOUBT`] is taken. Both were fitted to the training pictures (`infill/training/fit_prior.py`).
-pub const PRIOR: [f32; 4] = [1.3, 0.0, -4.3, 4.3];
+pub const PRIOR: [f32; 4] = [0.1, 0.0, -5.6, 3.2];
 
 /// How much less neighbours weigh where they disagree: times `4 c (1 - c)`, which is 0 where their mean coverage `c`
 /// is 0 or 1 and 1 where half of them show the surface.
-pub const DOUBT: f32 = 7.0;
+pub const DOUBT: f32 = 2.0;

@@ -7,9 +7,9 @@ from torch import nn
 # Candidates in the crate's order: neighbours (push-pull), coarse field, its thin variant, history.
 SOURCES = ["P", "L", "X", "R"]
 # `infill::PRIOR`: logarithms of the candidates' weights without a network.
-PRIOR = [1.3, 0.0, -4.3, 4.3]
+PRIOR = [0.1, 0.0, -5.6, 3.2]
 # `infill::DOUBT`: how much less neighbours that disagree weigh.
-DOUBT = 7.0
+DOUBT = 2.0
 # Voxels at which a soft distance is one half.
 HALF_DISTANCE = 8.0
 FEATURES = 16

@@ -116,7 +116,7 @@ fn main(
             atomicStore(&rays[RAYS_HEADER + id], RAY_DONE | RAY_HIT);
             atomicAdd(&hit_count, 1u);
         } else if (status == RAY_DONE) {
-            outputs_write_empty(frame_pixel(frame, id), false);
+            outputs_write_background(frame_pixel(frame, id));
         }
     }
     workgroupBarrier();

@@ -1,4 +1,5 @@
-// Starts a frame: every ray's first block, a bit for those that may hit something, cleared outputs.
+// Starts a frame: every ray's first block, a bit for those that may hit something. The pictures, unfinished everywhere,
+// get their background where no ray has anything to hit.
 #import frame
 #import indirect
 #import macrocell_skip
@@ -67,7 +68,9 @@ fn main(
             atomicOr(&active_bits[lane >> 5u], 1u << (lane & 31u));
         }
         atomicStore(&rays[RAYS_HEADER + id], state);
-        outputs_write_empty(pixel, state != RAY_DONE);
+        if (state == RAY_DONE) {
+            outputs_write_background(pixel);
+        }
     }
     workgroupBarrier();
     if ((lane & 31u) == 0u && id < frame.ray_numbers) {

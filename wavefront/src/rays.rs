@@ -191,7 +191,8 @@ impl Rays {
         })
     }
 
-    /// Records the start of a frame: clears the pictures and lists the rays that enter the volume, those of
+    /// Records the start of a frame: makes every pixel of the `textures`, those that the buffers were made for, an unfinished
+    /// one and lists the rays that enter the volume, those of
     /// the `sampling` mask alone if there is one.
     pub fn record_start(
         &self,
@@ -199,6 +200,7 @@ impl Rays {
         encoder: &mut wgpu::CommandEncoder,
         upload: &mut UploadRing,
         buffers: &RayBuffers,
+        textures: &OutputTextures,
         frame: &FrameParams,
         shading: &ShadingParams,
         sampling: Option<&SamplingParams>,
@@ -206,6 +208,8 @@ impl Rays {
         upload.write(device, encoder, &buffers.frame, 0, bytemuck::bytes_of(frame));
         upload.write(device, encoder, &buffers.shading, 0, bytemuck::bytes_of(shading));
         encoder.clear_buffer(&buffers.rays, 0, Some(4 * RAYS_HEADER_WORDS));
+        // A render pass's clearing costs a fraction of as many writes.
+        textures.record_unfinished(encoder, shading.unfinished);
         {
             let mut pass = begin(encoder, "wavefront.start");
             let groups = buffers.plan.numbers() / u64::from(RAYS_PER_GROUP);

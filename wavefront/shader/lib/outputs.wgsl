@@ -3,21 +3,12 @@
 
 const STATUS_BACKGROUND: u32 = 0u;
 const STATUS_HIT: u32 = 1u;
-const STATUS_UNFINISHED: u32 = 2u;
 
-// Depth of pixels without a hit: the largest f32, since shaders have no infinity.
-const DEPTH_NONE: f32 = 3.4028234663852886e38;
-
-fn outputs_write_empty(pixel: vec2<u32>, unfinished: bool) {
-    textureStore(color_out, pixel, select(shading.background, shading.unfinished, unfinished));
-#ifdef OUTPUT_DEPTH
-    textureStore(depth_out, pixel, vec4<f32>(DEPTH_NONE));
-#endif
-#ifdef OUTPUT_NORMAL
-    textureStore(normal_out, pixel, vec4<f32>(0.0));
-#endif
+// Of an unfinished pixel, as the start of a frame makes them all: depth and normal are those of the background already.
+fn outputs_write_background(pixel: vec2<u32>) {
+    textureStore(color_out, pixel, shading.background);
 #ifdef OUTPUT_STATUS
-    textureStore(status_out, pixel, vec4<u32>(select(STATUS_BACKGROUND, STATUS_UNFINISHED, unfinished)));
+    textureStore(status_out, pixel, vec4<u32>(STATUS_BACKGROUND));
 #endif
 }
 
