@@ -184,13 +184,11 @@ impl Rendering {
         upload: &mut UploadRing,
         stages: &Stages,
         textures: &OutputTextures,
-        (params, shading): (&FrameParams, &ShadingParams),
+        view: (&FrameParams, &ShadingParams),
         sampling: Option<&SamplingParams>,
     ) {
         let rays = &self.rays;
-        stages
-            .rays
-            .record_start(device, encoder, upload, rays, textures, params, shading, sampling);
+        stages.rays.record_start(device, encoder, upload, rays, textures, view, sampling);
         self.rounds.record_start(encoder, &stages.rays, &self.rays);
     }
 

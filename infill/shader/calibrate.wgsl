@@ -11,33 +11,26 @@
 @group(0) @binding(3) var<storage, read_write> tiles: array<atomic<u32>>;
 @group(0) @binding(4) var depth: texture_2d<f32>;
 @group(0) @binding(5) var normals: texture_2d<f32>;
-@group(0) @binding(6) var<storage, read> coarse_ranges: array<vec2<f32>>;
-@group(0) @binding(7) var<storage, read> codes_0: array<u32>;
-#ifdef CODE_PAGES_2
-@group(0) @binding(8) var<storage, read> codes_1: array<u32>;
-#endif
-#ifdef CODE_PAGES_3
-@group(0) @binding(9) var<storage, read> codes_2: array<u32>;
-#endif
 
 const LIST: u32 = 1u;
+const NO_SHARE: u32 = 0xffffffffu;
 
 var<workgroup> shares: atomic<u32>;
 var<workgroup> samples: atomic<u32>;
 
-// The share at a pixel in steps of 1 / TILES_SHARE_STEPS, or TILES_NO_SHARE.
+// The share at a pixel in steps of 1 / TILES_SHARE_STEPS, or NO_SHARE.
 fn pixel_share(pixel: vec2<u32>) -> u32 {
     if (any(pixel >= params.size) || infill_is_hole(frame_number(frame, pixel))) {
-        return TILES_NO_SHARE;
+        return NO_SHARE;
     }
     if (all(textureLoad(normals, pixel, 0).xyz == vec3<f32>(0.0))) {
-        return TILES_NO_SHARE;
+        return NO_SHARE;
     }
     let frame_ray = frame_ray(frame, pixel);
-    let t = (textureLoad(depth, pixel, 0).x - frame.start_depth) / frame_ray.depth_per_voxel;
+    let t = frame_t(frame, frame_ray, textureLoad(depth, pixel, 0).x);
     let ends = coarse_at(frame_ray.ray.origin + t * frame_ray.ray.direction).ends;
     if (!(ends.y > ends.x)) {
-        return TILES_NO_SHARE;
+        return NO_SHARE;
     }
     let share = clamp((frame.isovalue - ends.x) / (ends.y - ends.x), 0.0, 1.0);
     return u32(share * TILES_SHARE_STEPS + 0.5);
@@ -54,7 +47,7 @@ fn main(
     let word = infill_list_word(params, LIST, select(0u, index, listed));
     let corner = infill_tile_corner(params, atomicLoad(&tiles[word]));
     let share = pixel_share(corner + 2u * vec2<u32>(lane & 7u, lane >> 3u));
-    if (listed && share != TILES_NO_SHARE) {
+    if (listed && share != NO_SHARE) {
         atomicAdd(&shares, share);
         atomicAdd(&samples, 1u);
     }

@@ -21,20 +21,10 @@
 #ifdef NEIGHBOURS
 @group(0) @binding(AVERAGES_BINDING) var<storage, read> averages: array<vec4<u32>>;
 #endif
-#ifdef COARSE_FIELD
-@group(0) @binding(COARSE_BINDING) var<storage, read> coarse_ranges: array<vec2<f32>>;
-@group(0) @binding(COARSE_BINDING + 1u) var<storage, read> codes_0: array<u32>;
-#ifdef CODE_PAGES_2
-@group(0) @binding(COARSE_BINDING + 2u) var<storage, read> codes_1: array<u32>;
-#endif
-#ifdef CODE_PAGES_3
-@group(0) @binding(COARSE_BINDING + 3u) var<storage, read> codes_2: array<u32>;
-#endif
-#endif
 
 const LIST: u32 = 0u;
 
-fn guess(pixel: vec2<u32>, number: u32, inside: vec2<u32>, share: f32) -> vec3<u32> {
+fn guess(pixel: vec2<u32>, number: u32, inside: vec2<u32>) -> vec3<u32> {
     let ray = frame_ray(frame, pixel).ray;
     let to_viewer = shading_to_viewer(ray.direction);
     let t_low = infill_t_low(ray, number);
@@ -48,6 +38,7 @@ fn guess(pixel: vec2<u32>, number: u32, inside: vec2<u32>, share: f32) -> vec3<u
     }
 #endif
 #ifdef COARSE_FIELD
+    let share = infill_share(tiles[TILES_SHARES], tiles[TILES_SAMPLES]);
     let most_steps = MARCH_MOST_STEPS + frame_zero(number);
     let march = march(ray, infill_volume(), t_low, frame.isovalue, share, most_steps);
     let miss = candidate_pack(0.0, vec3<f32>(0.0), 0.0);
@@ -77,13 +68,12 @@ fn main(
 #ifdef NEIGHBOURS
     pull_tile(corner, lane);
 #endif
-    let share = infill_share(tiles[TILES_SHARES], tiles[TILES_SAMPLES]);
     for (var i = lane; i < INFILL_TILE * INFILL_TILE; i += 64u) {
         let inside = vec2<u32>(i % INFILL_TILE, i / INFILL_TILE);
         let pixel = corner + inside;
         let number = frame_number(frame, pixel);
         if (listed && all(pixel < params.size) && infill_is_hole(number)) {
-            let words = guess(pixel, number, inside, share);
+            let words = guess(pixel, number, inside);
             let first = 3u * infill_pixel_index(params, pixel);
             candidates[first] = words.x;
             candidates[first + 1u] = words.y;

@@ -14,14 +14,6 @@
 @group(0) @binding(3) var<storage, read> masks: array<vec2<u32>>;
 @group(0) @binding(4) var<storage, read_write> lru_directory: array<atomic<u32>>;
 @group(0) @binding(5) var<storage, read_write> lru_state: array<atomic<u32>>;
-@group(0) @binding(6) var<storage, read> coarse_ranges: array<vec2<f32>>;
-@group(0) @binding(7) var<storage, read> codes_0: array<u32>;
-#ifdef CODE_PAGES_2
-@group(0) @binding(8) var<storage, read> codes_1: array<u32>;
-#endif
-#ifdef CODE_PAGES_3
-@group(0) @binding(9) var<storage, read> codes_2: array<u32>;
-#endif
 
 // Of a block's range: what the pictures say of it is summed when they are filled, not before a round.
 const MIDPOINT: f32 = 0.5;

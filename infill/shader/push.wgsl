@@ -25,7 +25,7 @@ fn pixel_average(pixel: vec2<u32>) -> Average {
     if (all(normal == vec3<f32>(0.0))) {
         return Average(1.0, 0.0, vec3<f32>(0.0), 0.0);
     }
-    let t = (textureLoad(depth, pixel, 0).x - frame.start_depth) / frame_ray(frame, pixel).depth_per_voxel;
+    let t = frame_t(frame, frame_ray(frame, pixel), textureLoad(depth, pixel, 0).x);
     return Average(1.0, 1.0, normal, t);
 }
 

@@ -38,7 +38,7 @@ fn place_hit(position: vec4<f32>, normal: vec3<f32>) {
     if (!dda_meets(ray, infill_volume()) || dot(normal, shading_to_viewer(ray.direction)) <= 0.0) {
         return;
     }
-    let t = (dot(scatter.depth, position) - frame.start_depth) / frame_ray.depth_per_voxel;
+    let t = frame_t(frame, frame_ray, dot(scatter.depth, position));
     let key = history_key(t - dda_entry(ray, infill_volume()).t, normal);
     atomicMax(&keys[infill_pixel_index(params, pixel)], key);
 }
@@ -59,7 +59,7 @@ fn main(
         return;
     }
     let frame_ray = frame_ray(old_frame, pixel);
-    let t = (view_depth - old_frame.start_depth) / frame_ray.depth_per_voxel;
+    let t = frame_t(old_frame, frame_ray, view_depth);
     let position = frame_ray.ray.origin + t * frame_ray.ray.direction;
     place_hit(vec4<f32>(position, 1.0), textureLoad(normals, pixel, 0).xyz);
 }

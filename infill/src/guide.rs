@@ -8,7 +8,7 @@ use wavefront::RayBuffers;
 
 use crate::kernels;
 use crate::plan::InfillPlan;
-use crate::stage::InfillBuffers;
+use crate::stage::{InfillBuffers, coarse_field};
 
 /// The kernel. Immutable; used with any number of pictures.
 #[derive(Debug)]
@@ -55,9 +55,9 @@ impl Guide {
     ) -> GuideBinds {
         let GuideScene { rays, masks, ranges, cache: [directory, state] } = scene;
         let mut resources = vec![rays.frame().as_entire_binding(), buffers.params()];
-        let storage = [rays.rays(), masks, directory, state, ranges.coarse_ranges()];
+        let storage = [rays.rays(), masks, directory, state];
         resources.extend(storage.map(|buffer| buffer.as_entire_binding()));
-        resources.extend(ranges.code_pages().iter().map(|page| page.as_entire_binding()));
+        resources.extend(coarse_field(ranges));
         GuideBinds { bind: self.kernel.bind(device, "infill.guide", &resources) }
     }
 

@@ -152,9 +152,9 @@ pub(crate) fn push() -> KernelSource {
 }
 
 pub(crate) fn calibrate(plan: &InfillPlan) -> KernelSource {
-    let mut bindings = vec![FRAME, PARAMS, READ, READ_WRITE, TEXTURE, TEXTURE, PAIRS];
-    bindings.extend(vec![READ; plan.code_pages()]);
-    source("infill.calibrate", CALIBRATE, bindings, &code_page_constants(plan))
+    let mut bindings = vec![FRAME, PARAMS, READ, READ_WRITE, TEXTURE, TEXTURE];
+    let constants = coarse_field(&mut bindings, plan);
+    source("infill.calibrate", CALIBRATE, bindings, &constants)
 }
 
 pub(crate) fn guess(plan: &InfillPlan) -> KernelSource {
@@ -168,23 +168,25 @@ pub(crate) fn guess(plan: &InfillPlan) -> KernelSource {
     }
     if sources.coarse_field {
         constants.push(("COARSE_FIELD", Constant::Bool(true)));
-        constants.push(("COARSE_BINDING", next(&bindings)));
-        constants.extend(code_page_constants(plan));
-        bindings.push(PAIRS);
-        bindings.extend(vec![READ; plan.code_pages()]);
+        constants.extend(coarse_field(&mut bindings, plan));
     }
     source("infill.guess", GUESS, bindings, &constants)
 }
 
 pub(crate) fn guide(plan: &InfillPlan) -> KernelSource {
     let masks = PAIRS;
-    let mut bindings = vec![FRAME, PARAMS, READ, masks, READ_WRITE, READ_WRITE, PAIRS];
-    bindings.extend(vec![READ; plan.code_pages()]);
-    source("infill.guide", GUIDE, bindings, &code_page_constants(plan))
+    let mut bindings = vec![FRAME, PARAMS, READ, masks, READ_WRITE, READ_WRITE];
+    let constants = coarse_field(&mut bindings, plan);
+    source("infill.guide", GUIDE, bindings, &constants)
 }
 
-fn code_page_constants(plan: &InfillPlan) -> [(&'static str, Constant); 2] {
+/// Adds the bindings of the coarse field, as `shader/lib/coarse_field.wgsl` declares them; constants for it.
+fn coarse_field(bindings: &mut Vec<Binding>, plan: &InfillPlan) -> [(&'static str, Constant); 3] {
+    let first = next(bindings);
+    bindings.push(PAIRS);
+    bindings.extend(vec![READ; plan.code_pages()]);
     [
+        ("COARSE_BINDING", first),
         ("CODE_PAGES_2", Constant::Bool(plan.code_pages() >= 2)),
         ("CODE_PAGES_3", Constant::Bool(plan.code_pages() >= 3)),
     ]

@@ -252,6 +252,12 @@ impl InfillBuffers {
     }
 }
 
+/// What is bound of the coarse field, in the order of `shader/lib/coarse_field.wgsl`.
+pub(crate) fn coarse_field(ranges: &RangeBuffers) -> Vec<wgpu::BindingResource<'_>> {
+    let pages = ranges.code_pages().iter().map(|page| page.as_entire_binding());
+    std::iter::once(ranges.coarse_ranges().as_entire_binding()).chain(pages).collect()
+}
+
 /// What making the buffers needs all the time.
 struct Maker<'a> {
     device: &'a wgpu::Device,
@@ -332,13 +338,7 @@ impl Maker<'_> {
             &[depth.clone(), normals.clone()],
         ]
         .concat();
-        let coarse_field = || {
-            let mut buffers = vec![ranges.coarse_ranges().as_entire_binding()];
-            buffers.extend(ranges.code_pages().iter().map(|page| page.as_entire_binding()));
-            buffers
-        };
-        let mut calibrate = mark.clone();
-        calibrate.extend([depth, normals.clone()]);
+        let calibrate = [&mark[..], &[depth, normals.clone()], &coarse_field(ranges)].concat();
         let pixel = vec![
             rays.frame().as_entire_binding(),
             rays.shading().as_entire_binding(),
@@ -350,8 +350,7 @@ impl Maker<'_> {
         let mut guess = pixel.clone();
         guess.extend(plan.sources().neighbours.then(|| shared.as_entire_binding()));
         if plan.sources().coarse_field {
-            guess.extend(coarse_field());
-            calibrate.extend(coarse_field());
+            guess.extend(coarse_field(ranges));
         }
         let mut fill = pixel.clone();
         fill.extend([normals.clone(), wgpu::BindingResource::TextureView(textures.color_view())]);

@@ -191,9 +191,8 @@ impl Rays {
         })
     }
 
-    /// Records the start of a frame: makes every pixel of the `textures`, those that the buffers were made for, an unfinished
-    /// one and lists the rays that enter the volume, those of
-    /// the `sampling` mask alone if there is one.
+    /// Records the start of a frame: makes every pixel of the `textures`, those that the buffers were made for, an
+    /// unfinished one and lists the rays that enter the volume, those of the `sampling` mask alone if there is one.
     pub fn record_start(
         &self,
         device: &wgpu::Device,
@@ -201,8 +200,7 @@ impl Rays {
         upload: &mut UploadRing,
         buffers: &RayBuffers,
         textures: &OutputTextures,
-        frame: &FrameParams,
-        shading: &ShadingParams,
+        (frame, shading): (&FrameParams, &ShadingParams),
         sampling: Option<&SamplingParams>,
     ) {
         upload.write(device, encoder, &buffers.frame, 0, bytemuck::bytes_of(frame));

@@ -1,8 +1,15 @@
 // The volume at one pair of values per block: the ends of its value range, interpolated between the blocks' middles.
-// The importing text declares `frame`, `params` and the pages of
-//   var<storage, read> coarse_ranges: array<vec2<f32>>;
-//   var<storage, read> codes_0: array<u32>;
+// The importing text declares `frame` and `params`; the ranges are bound from COARSE_BINDING on.
 #import macrocell_quantise
+
+@group(0) @binding(COARSE_BINDING) var<storage, read> coarse_ranges: array<vec2<f32>>;
+@group(0) @binding(COARSE_BINDING + 1u) var<storage, read> codes_0: array<u32>;
+#ifdef CODE_PAGES_2
+@group(0) @binding(COARSE_BINDING + 2u) var<storage, read> codes_1: array<u32>;
+#endif
+#ifdef CODE_PAGES_3
+@group(0) @binding(COARSE_BINDING + 3u) var<storage, read> codes_2: array<u32>;
+#endif
 
 const COARSE_SPACING: f32 = 4.0; // voxels between the middles of blocks
 const COARSE_MIDDLE: f32 = 2.0;  // from a block's first voxel to the middle of its dual cells

@@ -24,7 +24,6 @@ const TILES_HEADER: u32 = 6u;
 
 // Of a share in the sum, which has room for a quarter of the pixels of the largest picture.
 const TILES_SHARE_STEPS: f32 = 128.0;
-const TILES_NO_SHARE: u32 = 0xffffffffu;
 // Samples that a share of one half counts for, so that a few hits do not decide.
 const TILES_PRIOR_SAMPLES: f32 = 16.0;
 

@@ -66,7 +66,7 @@ impl Scene<'_> {
         self.frame.size()
     }
 
-    fn index(&self, pixel: [u32; 2]) -> usize {
+    pub(super) fn index(&self, pixel: [u32; 2]) -> usize {
         (pixel[0] + self.size()[0] * pixel[1]) as usize
     }
 

@@ -43,6 +43,11 @@ fn frame_ray(frame: FrameParams, pixel: vec2<u32>) -> FrameRay {
     return FrameRay(dda_ray(origin, direction * depth_per_voxel), depth_per_voxel);
 }
 
+// Where a ray has a view depth in world units, in voxels.
+fn frame_t(frame: FrameParams, frame_ray: FrameRay, view_depth: f32) -> f32 {
+    return (view_depth - frame.start_depth) / frame_ray.depth_per_voxel;
+}
+
 // Zero, for any number below 2^31 that comes from memory. Mesa's lavapipe compiles a kernel anew whenever its uniforms change if a loop
 // ends at a value made of uniforms alone; with this zero added it is not.
 fn frame_zero(loaded: u32) -> u32 {

@@ -227,18 +227,8 @@ impl Stage {
         let identity = glam::DMat4::IDENTITY.to_cols_array_2d();
         let shading = ShadingParams::new(&Shading::default(), identity);
         let mut upload = UploadRing::new(&ledger, "test", 1024);
-        let (rays_of, pictures) = (&self.rays, &textures);
-        let upload = &mut upload;
-        rays_of.record_start(
-            device,
-            &mut encoder,
-            upload,
-            &rays,
-            pictures,
-            &params,
-            &shading,
-            None,
-        );
+        let uniforms = (&params, &shading);
+        self.rays.record_start(device, &mut encoder, &mut upload, &rays, &textures, uniforms, None);
         rounds.record_start(&mut encoder, &self.rays, &rays);
         let mut counters = Vec::new();
         while counters.last().is_none_or(|counters: &Counters| counters.active > 0) {
