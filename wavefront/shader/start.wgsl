@@ -20,7 +20,10 @@
 @group(0) @binding(STATUS_BINDING) var status_out: texture_storage_2d<r32uint, write>;
 #endif
 
-var<workgroup> active_bits: array<atomic<u32>, 2>;
+// Rays of one invocation, whose numbers follow each other: 2x2 pixels.
+const RAYS_EACH: u32 = 4u;
+
+var<workgroup> active_bits: array<atomic<u32>, 8>;
 var<workgroup> entered: atomic<u32>;
 
 fn macrocell_mask(index: u32) -> vec2<u32> {
@@ -38,49 +41,59 @@ fn waiting(ray: DdaRay, box: DdaBox) -> u32 {
     return RAY_ACTIVE | frame_pack_count(frame, frame.first_misses) | frame_pack(frame, cell >> vec3<u32>(2u));
 }
 
+// Starts a ray: (enters the volume, may hit something), 1 for yes.
+fn start(id: u32, pixel: vec2<u32>, volume: DdaBox, box: DdaBox) -> vec2<u32> {
+    let ray = frame_ray(frame, pixel).ray;
+    // Whatever meets a part of the volume meets all of it.
+    if (meets(ray, box)) {
+        atomicStore(&rays[RAYS_HEADER + id], waiting(ray, box));
+        return vec2<u32>(1u);
+    }
+    atomicStore(&rays[RAYS_HEADER + id], RAY_DONE);
+    outputs_write_background(pixel);
+    return vec2<u32>(u32(meets(ray, volume)), 0u);
+}
+
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    if (lane < 2u) {
+    if (lane < 8u) {
         atomicStore(&active_bits[lane], 0u);
     }
     if (lane == 0u) {
         atomicStore(&entered, 0u);
     }
     workgroupBarrier();
-    let id = indirect_linear_group(group, groups) * 64u + lane;
-    let pixel = frame_pixel(frame, id);
-    if (id < frame.ray_numbers && pixel.x < frame.width && pixel.y < frame.height) {
-        let ray = frame_ray(frame, pixel).ray;
-        let zero = i32(frame_zero(atomicLoad(&rays[RAYS_HITS])));
-        let volume = DdaBox(vec3<i32>(0), frame.grid.last_cell + vec3<i32>(zero));
+    let first = (indirect_linear_group(group, groups) * 64u + lane) * RAYS_EACH;
+    if (first < frame.ray_numbers) {
+        let zero = frame_zero(atomicLoad(&rays[RAYS_HITS]));
+        let volume = DdaBox(vec3<i32>(0), frame.grid.last_cell + vec3<i32>(i32(zero)));
         let grid = macrocell_active(frame.grid);
         let box = DdaBox(4 * grid.first_block, grid.last_cell);
-        if (meets(ray, volume)) {
-            atomicAdd(&entered, 1u);
+        let corner = frame_pixel(frame, first);
+        var counts = vec2<u32>(0u);
+        for (var i = 0u; i < RAYS_EACH + zero; i++) {
+            let pixel = corner + vec2<u32>(i & 1u, i >> 1u);
+            if (pixel.x < frame.width && pixel.y < frame.height) {
+                let started = start(first + i, pixel, volume, box);
+                counts += vec2<u32>(started.x, started.y << i);
+            }
         }
-        var state = RAY_DONE;
-        if (meets(ray, box)) {
-            state = waiting(ray, box);
-            atomicOr(&active_bits[lane >> 5u], 1u << (lane & 31u));
-        }
-        atomicStore(&rays[RAYS_HEADER + id], state);
-        if (state == RAY_DONE) {
-            outputs_write_background(pixel);
-        }
+        atomicOr(&active_bits[lane >> 3u], counts.y << (RAYS_EACH * (lane & 7u)));
+        atomicAdd(&entered, counts.x);
     }
     workgroupBarrier();
-    if ((lane & 31u) == 0u && id < frame.ray_numbers) {
-        atomicStore(&rays[frame_active_word(frame, id)], atomicLoad(&active_bits[lane >> 5u]));
+    if ((lane & 7u) == 0u && first < frame.ray_numbers) {
+        atomicStore(&rays[frame_active_word(frame, first)], atomicLoad(&active_bits[lane >> 3u]));
     }
     if (lane == 0u) {
         atomicAdd(&rays[RAYS_ENTERED], atomicLoad(&entered));
-    }
-    if (id == 0u) {
-        atomicStore(&rays[RAYS_ACTIVE], 1u);
-        atomicStore(&rays[RAYS_LISTED], 1u); // the first list is to be made
+        if (first == 0u) {
+            atomicStore(&rays[RAYS_ACTIVE], 1u);
+            atomicStore(&rays[RAYS_LISTED], 1u); // the first list is to be made
+        }
     }
 }

@@ -34,6 +34,8 @@ const RESOLVE: Module = Module { name: "resolve", source: include_str!("../shade
 
 /// Rays of one workgroup of every kernel that goes over rays.
 pub(crate) const RAYS_PER_GROUP: u32 = 64;
+/// Rays of one workgroup of the kernel that starts them.
+const RAYS_PER_START_GROUP: u32 = 256;
 
 /// Binding of the rays' header and states.
 pub(crate) const RAYS: Binding = Binding::StorageReadWrite { min_bytes: 4 * RAYS_HEADER_WORDS + 4 };
@@ -210,7 +212,7 @@ impl Rays {
         textures.record_unfinished(encoder, shading.unfinished);
         {
             let mut pass = begin(encoder, "wavefront.start");
-            let groups = buffers.plan.numbers() / u64::from(RAYS_PER_GROUP);
+            let groups = buffers.plan.numbers().div_ceil(u64::from(RAYS_PER_START_GROUP));
             self.start.dispatch(&mut pass, &buffers.start, groups);
         }
         if let (Some(sampling), Some(foveation)) = (sampling, &buffers.foveation) {
