@@ -28,7 +28,7 @@ fn pixel_share(pixel: vec2<u32>) -> u32 {
     }
     let frame_ray = frame_ray(frame, pixel);
     let t = frame_t(frame, frame_ray, textureLoad(depth, pixel, 0).x);
-    let ends = coarse_at(frame_ray.ray.origin + t * frame_ray.ray.direction).ends;
+    let ends = coarse_ends(coarse_at(frame_ray.ray.origin + t * frame_ray.ray.direction));
     if (!(ends.y > ends.x)) {
         return NO_SHARE;
     }

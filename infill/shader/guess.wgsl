@@ -56,6 +56,19 @@ fn guess(pixel: vec2<u32>, number: u32, inside: vec2<u32>) -> vec3<u32> {
     return words;
 }
 
+// The tile's holes, so that no lane is without one while others work.
+var<workgroup> holes: array<u32, INFILL_TILE * INFILL_TILE>;
+var<workgroup> hole_count: atomic<u32>;
+
+fn collect_holes(corner: vec2<u32>, lane: u32) {
+    for (var i = lane; i < INFILL_TILE * INFILL_TILE; i += 64u) {
+        let pixel = corner + vec2<u32>(i % INFILL_TILE, i / INFILL_TILE);
+        if (all(pixel < params.size) && infill_is_hole(frame_number(frame, pixel))) {
+            holes[atomicAdd(&hole_count, 1u)] = i;
+        }
+    }
+}
+
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
@@ -65,19 +78,25 @@ fn main(
     let index = indirect_linear_group(group, groups);
     let listed = index < tiles[LIST];
     let corner = infill_tile_corner(params, tiles[infill_list_word(params, LIST, select(0u, index, listed))]);
+    if (lane == 0u) {
+        atomicStore(&hole_count, 0u);
+    }
+    workgroupBarrier();
+    if (listed) {
+        collect_holes(corner, lane);
+    }
+    workgroupBarrier();
 #ifdef NEIGHBOURS
     pull_tile(corner, lane);
 #endif
-    for (var i = lane; i < INFILL_TILE * INFILL_TILE; i += 64u) {
-        let inside = vec2<u32>(i % INFILL_TILE, i / INFILL_TILE);
+    let count = atomicLoad(&hole_count);
+    for (var i = lane; i < count; i += 64u) {
+        let inside = vec2<u32>(holes[i] % INFILL_TILE, holes[i] / INFILL_TILE);
         let pixel = corner + inside;
-        let number = frame_number(frame, pixel);
-        if (listed && all(pixel < params.size) && infill_is_hole(number)) {
-            let words = guess(pixel, number, inside);
-            let first = 3u * infill_pixel_index(params, pixel);
-            candidates[first] = words.x;
-            candidates[first + 1u] = words.y;
-            candidates[first + 2u] = words.z;
-        }
+        let words = guess(pixel, frame_number(frame, pixel), inside);
+        let first = 3u * infill_pixel_index(params, pixel);
+        candidates[first] = words.x;
+        candidates[first + 1u] = words.y;
+        candidates[first + 2u] = words.z;
     }
 }

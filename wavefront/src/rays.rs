@@ -19,7 +19,8 @@ use crate::samples::{SampleLayout, Samples};
 
 pub(crate) const FRAME: Module =
     Module { name: "frame", source: include_str!("../shader/lib/frame.wgsl") };
-const CELL: Module = Module { name: "cell", source: include_str!("../shader/lib/cell.wgsl") };
+pub(crate) const CELL: Module =
+    Module { name: "cell", source: include_str!("../shader/lib/cell.wgsl") };
 const BLOCK_WALK: Module =
     Module { name: "block_walk", source: include_str!("../shader/lib/block_walk.wgsl") };
 const WORK: Module = Module { name: "work", source: include_str!("../shader/lib/work.wgsl") };

@@ -11,6 +11,9 @@ pub const FRAME: Module = rays::FRAME;
 /// Shading of a surface.
 pub const SHADING: Module = outputs::SHADING;
 
+/// The trilinear field in a cell.
+pub const CELL: Module = rays::CELL;
+
 /// Which blocks hold the samples of a ray's cells in a block.
 pub const BLOCK_NEED: Module = rays::BLOCK_NEED;
 
@@ -19,7 +22,7 @@ pub const BLOCK_REQUEST: Module = rays::BLOCK_REQUEST;
 
 /// Everything a kernel needs to import from this crate, with what that imports.
 pub fn modules() -> Vec<Module> {
-    let mut modules = vec![FRAME, SHADING, BLOCK_NEED, BLOCK_REQUEST];
+    let mut modules = vec![FRAME, SHADING, CELL, BLOCK_NEED, BLOCK_REQUEST];
     modules.extend(macrocell::wgsl::MODULES);
     modules.extend(lru_cache_gpu::wgsl::MODULES);
     modules

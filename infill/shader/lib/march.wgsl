@@ -22,14 +22,14 @@ fn march_at(ray: DdaRay, t: f32) -> CoarseSample {
 fn march(ray: DdaRay, volume: DdaBox, t_low: f32, isovalue: f32, share: f32, most_steps: u32) -> March {
     let entry = dda_entry(ray, volume).t;
     let exit = dda_exit(ray, volume).t;
-    let inside = coarse_values(march_at(ray, entry), vec2<f32>(share)).x >= isovalue;
+    let inside = coarse_values(coarse_ends(march_at(ray, entry)), vec2<f32>(share)).x >= isovalue;
     let shares = vec2<f32>(share, 0.5 * (share + select(1.0, 0.0, inside)));
     var march = March(vec2<bool>(false), vec2<f32>(0.0), shares);
     var t = t_low;
     var before = t_low;
     var values_before = vec2<f32>(0.0);
     for (var step = 0u; step < most_steps; step++) {
-        let values = coarse_values(march_at(ray, t), shares) - vec2<f32>(isovalue);
+        let values = coarse_values(coarse_ends(march_at(ray, t)), shares) - vec2<f32>(isovalue);
         let crossed = (values >= vec2<f32>(0.0)) != vec2<bool>(inside);
         let found = crossed & !march.hit;
         // The first sample lies behind no other: the crossing is where the ray waits.

@@ -2,7 +2,7 @@
 
 use wavefront::cpu::frame::FrameRay;
 
-use super::field::{CoarseField, CoarseSample};
+use super::field::CoarseField;
 use super::fill::{Finished, Scene};
 use crate::plan::TILE;
 
@@ -14,8 +14,7 @@ const STEPS: f32 = 128.0;
 const PRIOR_SAMPLES: f32 = 16.0;
 
 /// The share of a value between the interpolated ends of the blocks' ranges, in steps; `None` where these are equal.
-fn share_of(sample: &CoarseSample, value: f32) -> Option<u32> {
-    let [low, high] = sample.ends;
+fn share_of([low, high]: [f32; 2], value: f32) -> Option<u32> {
     (high > low).then(|| (((value - low) / (high - low)).clamp(0.0, 1.0) * STEPS + 0.5) as u32)
 }
 
@@ -71,7 +70,7 @@ impl Scene<'_> {
         let frame_ray = FrameRay::new(self.frame, pixel);
         let (t, ray) = (frame_ray.t(self.frame, depth), &frame_ray.ray);
         let position = std::array::from_fn(|a| ray.origin[a] + t * ray.direction[a]);
-        share_of(&field.at(position), self.frame.isovalue())
+        share_of(field.at(position).ends(), self.frame.isovalue())
     }
 }
 
@@ -81,13 +80,12 @@ mod tests {
 
     #[test]
     fn a_value_outside_the_range_counts_as_its_end() {
-        let sample = CoarseSample { ends: [2.0, 6.0], ..CoarseSample::default() };
+        let ends = [2.0, 6.0];
         assert_eq!(
-            [1.0, 3.0, 9.0].map(|value| share_of(&sample, value)),
+            [1.0, 3.0, 9.0].map(|value| share_of(ends, value)),
             [Some(0), Some(32), Some(128)]
         );
-        let flat = CoarseSample { ends: [2.0; 2], ..sample };
-        assert_eq!(share_of(&flat, 2.0), None);
+        assert_eq!(share_of([2.0; 2], 2.0), None);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use macrocell::Grid;
 use macrocell::cpu::ranges::{Ranges, scale};
+use wavefront::cpu::cell::Corners;
 
 /// Voxels between the middles of neighbouring blocks, and from a block's first voxel to the middle of its dual cells.
 const SPACING: f32 = 4.0;
@@ -15,13 +16,15 @@ pub struct CoarseField {
     ranges: Vec<[f32; 2]>,
 }
 
-/// The interpolated ends of the ranges at a position, and their gradients per voxel.
+/// The ends of the ranges of the eight blocks around a position.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CoarseSample {
-    /// Lower and upper end.
-    pub ends: [f32; 2],
-    /// Gradient of each.
-    pub gradients: [[f32; 3]; 2],
+    /// Lower ends.
+    pub lower: Corners,
+    /// Upper ends.
+    pub upper: Corners,
+    /// The place between the blocks' middles, 0 to 1 on each axis.
+    pub place: [f32; 3],
 }
 
 impl CoarseField {
@@ -55,42 +58,45 @@ impl CoarseField {
 
     /// The field at an index-space position; constant beyond the outermost blocks' middles.
     pub fn at(&self, position: [f32; 3]) -> CoarseSample {
-        let place: [(u32, u32, f32); 3] = std::array::from_fn(|a| {
+        let axes: [(u32, u32, f32); 3] = std::array::from_fn(|a| {
             let last = self.last_block[a] as f32;
             let q = ((position[a] - MIDDLE) / SPACING).clamp(0.0, last);
             let first = q.floor();
             (first as u32, (first as u32 + 1).min(self.last_block[a]), q - first)
         });
-        let mut sample = CoarseSample::default();
-        for corner in 0..8 {
-            let upper = [corner & 1, corner >> 1 & 1, corner >> 2];
-            let block =
-                std::array::from_fn(|a| if upper[a] == 1 { place[a].1 } else { place[a].0 });
-            let weight = |a: usize| if upper[a] == 1 { place[a].2 } else { 1.0 - place[a].2 };
-            let slope = |a: usize| if upper[a] == 1 { 1.0 / SPACING } else { -1.0 / SPACING };
-            let [wx, wy, wz] = [weight(0), weight(1), weight(2)];
-            let slopes = [slope(0) * wy * wz, wx * slope(1) * wz, wx * wy * slope(2)];
-            for (end, value) in self.block(block).into_iter().enumerate() {
-                sample.ends[end] += wx * wy * wz * value;
-                for (gradient, slope) in sample.gradients[end].iter_mut().zip(slopes) {
-                    *gradient += slope * value;
-                }
-            }
-        }
-        sample
+        let pick = |axis: usize, upper: bool| if upper { axes[axis].1 } else { axes[axis].0 };
+        let at =
+            |x: bool, i: usize| self.block([pick(0, x), pick(1, i & 1 == 1), pick(2, i >> 1 == 1)]);
+        let corners = |end: usize| Corners {
+            low: std::array::from_fn(|i| at(false, i)[end]),
+            high: std::array::from_fn(|i| at(true, i)[end]),
+        };
+        CoarseSample { lower: corners(0), upper: corners(1), place: axes.map(|axis| axis.2) }
     }
 }
 
 impl CoarseSample {
-    /// The value at a share of the way from the lower to the upper end.
-    pub fn value(&self, share: f32) -> f32 {
-        self.ends[0] + share * (self.ends[1] - self.ends[0])
+    /// The interpolated ends.
+    pub fn ends(&self) -> [f32; 2] {
+        [&self.lower, &self.upper].map(|corners| corners.value(self.place))
     }
 
-    /// The gradient of [`CoarseSample::value`].
+    /// The value at a share of the way from the lower to the upper end.
+    pub fn value(&self, share: f32) -> f32 {
+        let [low, high] = self.ends();
+        low + share * (high - low)
+    }
+
+    /// The gradient of the values at a share, per voxel.
     pub fn gradient(&self, share: f32) -> [f32; 3] {
-        let [low, high] = self.gradients;
-        std::array::from_fn(|a| low[a] + share * (high[a] - low[a]))
+        let mixed = |low: [f32; 4], high: [f32; 4]| {
+            std::array::from_fn(|i| low[i] + share * (high[i] - low[i]))
+        };
+        let corners = Corners {
+            low: mixed(self.lower.low, self.upper.low),
+            high: mixed(self.lower.high, self.upper.high),
+        };
+        corners.gradient(self.place).map(|g| g / SPACING)
     }
 }
 

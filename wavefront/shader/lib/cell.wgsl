@@ -164,6 +164,13 @@ fn cell_root(b: vec4<f32>, bracket: CellBracket, inside_low: bool) -> f32 {
     return root;
 }
 
+// The trilinear field at `p`.
+fn cell_value(corners: CellCorners, p: vec3<f32>) -> f32 {
+    let x = cell_mix4(corners.low, corners.high, p.x);
+    let y = cell_mix2(x.xz, x.yw, p.y);
+    return cell_mix(y.x, y.y, p.z);
+}
+
 // Gradient of the trilinear field at `p`, per voxel.
 fn cell_gradient(corners: CellCorners, p: vec3<f32>) -> vec3<f32> {
     let dx = corners.high - corners.low;

@@ -60,6 +60,12 @@ impl Corners {
         [z(aa, a[2]), first * third, second * third, z(bb, b[2])]
     }
 
+    /// The trilinear field at `p`, in [0, 1]^3.
+    pub fn value(&self, p: [f32; 3]) -> f32 {
+        let y = mix_first(mix_all(self.low, self.high, p[0]), p[1]);
+        mix(y[0], y[1], p[2])
+    }
+
     /// Gradient of the trilinear field at `p`, per voxel.
     pub fn gradient(&self, p: [f32; 3]) -> [f32; 3] {
         let dx: [f32; 4] = std::array::from_fn(|i| self.high[i] - self.low[i]);
