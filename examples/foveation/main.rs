@@ -161,7 +161,7 @@ fn measure(
         rest::measure(gpu, volume, plan, &mut rows.rest)?;
     }
     if arguments.wants(Part::Speed) {
-        speed::measure(gpu, volume, plan, &mut rows.speed)?;
+        speed::measure(arguments.adapter.as_deref(), volume, plan, &mut rows.speed)?;
     }
     Ok(())
 }

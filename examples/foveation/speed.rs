@@ -58,6 +58,8 @@ pub struct Fill {
 
 /// A renderer with the frames of which it takes the times.
 struct Clocked {
+    /// Its own: renderers that share a device of a software adapter make each other slower.
+    gpu: Gpu,
     filler: Filler,
     place: Place,
     size: [u32; 2],
@@ -69,7 +71,7 @@ struct Clocked {
 
 /// Adds a row for every density, with a warm cache and with everything resident.
 pub fn measure(
-    gpu: &Gpu,
+    adapter: Option<&str>,
     volume: &Volume,
     plan: &Plan,
     rows: &mut Vec<Speed>,
@@ -91,13 +93,13 @@ pub fn measure(
     };
     let far = Case { place: Place::Far, densities: middle, ..near };
     for case in [near, full, far] {
-        measure_case(gpu, volume, plan, &case, rows)?;
+        measure_case(adapter, volume, plan, &case, rows)?;
     }
     Ok(())
 }
 
 fn measure_case(
-    gpu: &Gpu,
+    adapter: Option<&str>,
     volume: &Volume,
     plan: &Plan,
     case: &Case<'_>,
@@ -106,7 +108,7 @@ fn measure_case(
     let clocked = |way, foveated| {
         let residency = case.residency;
         let options = RendererOptions { residency, ..options(plan.speed_size, way, foveated) };
-        Clocked::new(gpu, volume, case.place, way, options)
+        Clocked::new(adapter, volume, case.place, way, options)
     };
     let mut contenders = vec![clocked(OFF, false)?, clocked(OFF, true)?];
     for way in case.fills {
@@ -116,7 +118,7 @@ fn measure_case(
         let foveation = Foveation { sigma: SIGMA, base_density, ..Foveation::default() };
         for run in 0..=plan.runs {
             for contender in &mut contenders {
-                contender.run(gpu, volume, run, foveation)?;
+                contender.run(volume, run, foveation)?;
             }
         }
         let row = Speed::new(volume, case.name, foveation, &mut contenders);
@@ -129,7 +131,7 @@ fn measure_case(
 impl Clocked {
     /// Renders a frame to its end, so that whatever it needs is decoded.
     fn new(
-        gpu: &Gpu,
+        adapter: Option<&str>,
         volume: &Volume,
         place: Place,
         way: Way,
@@ -137,25 +139,23 @@ impl Clocked {
     ) -> Result<Self, Failure> {
         let options = RendererOptions { outputs: Outputs::default(), capture: false, ..options };
         let (size, foveated) = (options.size, options.foveation.is_some());
-        let mut filler = Filler::new(gpu, volume, way, options)?;
+        let gpu = Gpu::new(adapter)?;
+        let mut filler = Filler::new(&gpu, volume, way, options)?;
         filler.set_frame(volume.camera(place, 0, size), None)?;
-        filler.finish(gpu)?;
-        Ok(Self { filler, place, size, foveated, ms: Vec::new(), sampled: 1.0, entered: 0.0 })
+        filler.finish(&gpu)?;
+        Ok(Self { gpu, filler, place, size, foveated, ms: Vec::new(), sampled: 1.0, entered: 0.0 })
     }
 
     /// One frame; the first of a series does not count.
-    fn run(
-        &mut self,
-        gpu: &Gpu,
-        volume: &Volume,
-        run: u32,
-        foveation: Foveation,
-    ) -> Result<(), Failure> {
+    fn run(&mut self, volume: &Volume, run: u32, foveation: Foveation) -> Result<(), Failure> {
         let camera = volume.camera(self.place, 0, self.size);
         let start = Instant::now();
         self.filler.set_frame(camera, self.foveated.then_some(foveation))?;
-        let report =
-            if self.foveated { self.filler.pass(gpu)? } else { self.filler.finish(gpu)? };
+        let report = if self.foveated {
+            self.filler.pass(&self.gpu)?
+        } else {
+            self.filler.finish(&self.gpu)?
+        };
         let ms = start.elapsed().as_secs_f64() * 1e3;
         let share = |count: u32| f64::from(count) / f64::from(report.rays);
         (self.sampled, self.entered) = (share(report.sampled_rays), share(report.entered_rays));

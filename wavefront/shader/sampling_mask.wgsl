@@ -17,7 +17,10 @@ struct SamplingParams {
 @group(0) @binding(3) var<storage, read> tiles: array<u32>; // two ranks a word
 @group(0) @binding(4) var<storage, read_write> sampling_mask: array<u32>;
 
-var<workgroup> drawn: array<atomic<u32>, 2>;
+// Rays of one invocation, whose numbers follow each other: 2x2 pixels.
+const RAYS_EACH: u32 = 4u;
+
+var<workgroup> drawn: array<atomic<u32>, 8>;
 var<workgroup> added: atomic<u32>;
 
 fn tile_rank(pixel: vec2<u32>) -> u32 {
@@ -48,32 +51,35 @@ fn main(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    if (lane < 2u) {
+    if (lane < 8u) {
         atomicStore(&drawn[lane], 0u);
     }
     if (lane == 0u) {
         atomicStore(&added, 0u);
     }
     workgroupBarrier();
-    let id = indirect_linear_group(group, groups) * 64u + lane;
-    let pixel = frame_pixel(frame, id);
-    let inside = id < frame.ray_numbers && pixel.x < frame.width && pixel.y < frame.height;
-    if (inside && is_drawn(pixel)) {
-        atomicOr(&drawn[lane >> 5u], 1u << (lane & 31u));
+    let first = (indirect_linear_group(group, groups) * 64u + lane) * RAYS_EACH;
+    let corner = frame_pixel(frame, first);
+    var bits = 0u;
+    for (var i = 0u; i < RAYS_EACH; i++) {
+        let pixel = corner + vec2<u32>(i & 1u, i >> 1u);
+        let inside = first < frame.ray_numbers && pixel.x < frame.width && pixel.y < frame.height;
+        bits |= select(0u, 1u << i, inside && is_drawn(pixel));
     }
+    atomicOr(&drawn[lane >> 3u], bits << (RAYS_EACH * (lane & 7u)));
     workgroupBarrier();
-    if ((lane & 31u) == 0u && id < frame.ray_numbers) {
-        let before = sampling_mask[id >> 5u];
-        let now = before | atomicLoad(&drawn[lane >> 5u]);
-        sampling_mask[id >> 5u] = now;
+    if ((lane & 7u) == 0u && first < frame.ray_numbers) {
+        let before = sampling_mask[first >> 5u];
+        let now = before | atomicLoad(&drawn[lane >> 3u]);
+        sampling_mask[first >> 5u] = now;
         atomicAdd(&added, countOneBits(now ^ before));
     }
     workgroupBarrier();
     if (lane == 0u) {
         atomicAdd(&rays[RAYS_SAMPLED], atomicLoad(&added));
-    }
-    if (id == 0u) {
-        atomicStore(&rays[RAYS_MASKED], 1u);
-        atomicStore(&rays[RAYS_LISTED], 1u); // the list is to be made again
+        if (first == 0u) {
+            atomicStore(&rays[RAYS_MASKED], 1u);
+            atomicStore(&rays[RAYS_LISTED], 1u); // the list is to be made again
+        }
     }
 }

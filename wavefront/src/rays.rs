@@ -35,7 +35,7 @@ const RESOLVE: Module = Module { name: "resolve", source: include_str!("../shade
 
 /// Rays of one workgroup of every kernel that goes over rays.
 pub(crate) const RAYS_PER_GROUP: u32 = 64;
-/// Rays of one workgroup of the kernel that starts them.
+/// Rays of one workgroup of the kernels that start them and that make the sampling mask.
 const RAYS_PER_START_GROUP: u32 = 256;
 
 /// Binding of the rays' header and states.
@@ -237,7 +237,7 @@ impl Rays {
         if let (Some(kernel), Some(foveation)) = (&self.sampling_mask, &buffers.foveation) {
             upload.write(device, encoder, &foveation.params, 0, bytemuck::bytes_of(sampling));
             let mut pass = begin(encoder, "wavefront.sampling_mask");
-            let groups = buffers.plan.numbers() / u64::from(RAYS_PER_GROUP);
+            let groups = buffers.plan.numbers().div_ceil(u64::from(RAYS_PER_START_GROUP));
             kernel.dispatch(&mut pass, &foveation.bind, groups);
             self.record_list(&mut pass, buffers);
         }
