@@ -1,6 +1,7 @@
 // The network's first convolution, of the features, over the tiles within two tiles of holes.
-#import features
+#import sources
 #import conv
+#import shading
 #import indirect
 
 @group(0) @binding(0) var<uniform> frame: FrameParams;
@@ -20,6 +21,32 @@ const LIST: u32 = 2u;
 const HALO: u32 = INFILL_TILE + 2u;
 const GROUPS: u32 = 4u;
 const CONV_MEMORY: u32 = HALO * HALO * GROUPS;
+
+// What the network reads at a pixel, in groups of four: finished, its coverage, coverage times N.V; the same two of every
+// candidate; whether history has one; soft distances of coarse field, thin variant, neighbours, history.
+fn features_at(pixel: vec2<u32>) -> array<vec4<f32>, 4> {
+    let number = frame_number(frame, pixel);
+    let ray = frame_ray(frame, pixel).ray;
+    let to_viewer = shading_to_viewer(ray.direction);
+    if (!infill_is_hole(number)) {
+        let normal = textureLoad(normals, pixel, 0).xyz;
+        let c = select(0.0, 1.0, any(normal != vec3<f32>(0.0)));
+        let cn = clamp(dot(normal, to_viewer), 0.0, 1.0);
+        return array<vec4<f32>, 4>(
+            vec4<f32>(1.0, c, cn, c), vec4<f32>(cn, c, cn, c), vec4<f32>(cn, 1.0, c, cn), vec4<f32>(0.0));
+    }
+    var found = sources_candidates(sources_guesses(pixel), pixel, ray, number);
+    var cn = vec4<f32>(0.0);
+    for (var i = 0u; i < 4u; i++) {
+        cn[i] = found[i].coverage * candidate_facing(found[i], to_viewer);
+    }
+    return array<vec4<f32>, 4>(
+        vec4<f32>(0.0, 0.0, 0.0, found[0].coverage),
+        vec4<f32>(cn.x, found[1].coverage, cn.y, found[2].coverage),
+        vec4<f32>(cn.z, select(0.0, 1.0, found[3].valid), found[3].coverage, cn.w),
+        vec4<f32>(found[1].soft_distance, found[2].soft_distance, found[0].soft_distance, found[3].soft_distance),
+    );
+}
 
 @compute @workgroup_size(CONV_LANES)
 fn main(

@@ -18,7 +18,7 @@ macro_rules! modules {
 }
 
 /// What kernels of this crate import from it.
-const LIBRARY: [Module; 12] = modules![
+const LIBRARY: [Module; 14] = modules![
     infill_params = "infill_params.wgsl",
     infill_rays = "infill_rays.wgsl",
     candidate = "candidate.wgsl",
@@ -26,8 +26,10 @@ const LIBRARY: [Module; 12] = modules![
     pull = "pull.wgsl",
     coarse_field = "coarse_field.wgsl",
     march = "march.wgsl",
+    guesses = "guesses.wgsl",
+    holes = "holes.wgsl",
     history = "history.wgsl",
-    features = "features.wgsl",
+    sources = "sources.wgsl",
     conv = "conv.wgsl",
     decode = "decode.wgsl",
     mix = "mix.wgsl",
@@ -158,19 +160,25 @@ pub(crate) fn calibrate(plan: &InfillPlan) -> KernelSource {
 }
 
 pub(crate) fn guess(plan: &InfillPlan) -> KernelSource {
-    let sources = plan.sources();
     let mut bindings = vec![FRAME, SHADING, PARAMS, READ, READ, READ_WRITE];
+    let constants = guesses(&mut bindings, plan);
+    source("infill.guess", GUESS, bindings, &constants)
+}
+
+/// Adds the bindings of what `shader/lib/guesses.wgsl` reads; constants for it.
+fn guesses(bindings: &mut Vec<Binding>, plan: &InfillPlan) -> Vec<(&'static str, Constant)> {
+    let sources = plan.sources();
     let mut constants = Vec::new();
     if sources.neighbours {
         constants.push(("NEIGHBOURS", Constant::Bool(true)));
-        constants.push(("AVERAGES_BINDING", next(&bindings)));
+        constants.push(("AVERAGES_BINDING", next(bindings)));
         bindings.push(AVERAGES);
     }
     if sources.coarse_field {
         constants.push(("COARSE_FIELD", Constant::Bool(true)));
-        constants.extend(coarse_field(&mut bindings, plan));
+        constants.extend(coarse_field(bindings, plan));
     }
-    source("infill.guess", GUESS, bindings, &constants)
+    constants
 }
 
 pub(crate) fn guide(plan: &InfillPlan) -> KernelSource {
@@ -199,7 +207,7 @@ fn weights(layer: usize) -> Constant {
 
 pub(crate) fn encode(plan: &InfillPlan) -> KernelSource {
     let mut bindings = vec![FRAME, SHADING, PARAMS, READ, READ, READ, PAIRS, PAIRS_WRITE, TEXTURE];
-    let mut constants = vec![("FIRST_WEIGHTS", weights(0))];
+    let mut constants = vec![("NETWORK", Constant::Bool(true)), ("FIRST_WEIGHTS", weights(0))];
     if plan.sources().history {
         constants.push(("HISTORY", Constant::Bool(true)));
         bindings.push(READ);
@@ -224,7 +232,7 @@ pub(crate) fn pairs() -> [KernelSource; 2] {
 }
 
 pub(crate) fn fill(plan: &InfillPlan, network: bool) -> KernelSource {
-    let mut bindings = vec![FRAME, SHADING, PARAMS, READ, READ_WRITE, READ, TEXTURE, COLOR];
+    let mut bindings = vec![FRAME, SHADING, PARAMS, READ, READ_WRITE, COLOR];
     let mut constants = vec![
         ("PRIOR_NEIGHBOURS", Constant::F32(PRIOR[0])),
         ("PRIOR_COARSE", Constant::F32(PRIOR[1])),
@@ -243,7 +251,10 @@ pub(crate) fn fill(plan: &InfillPlan, network: bool) -> KernelSource {
         constants.push(("HEAD_WEIGHTS", weights(7)));
         constants.push(("NETWORK", Constant::Bool(true)));
         constants.push(("NETWORK_BINDING", next(&bindings)));
+        bindings.push(READ);
         bindings.extend([PAIRS; 4]);
+    } else {
+        constants.extend(guesses(&mut bindings, plan));
     }
     let label = if network { "infill.fill.network" } else { "infill.fill.classical" };
     source(label, FILL, bindings, &constants)

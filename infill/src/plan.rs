@@ -138,8 +138,9 @@ impl InfillPlan {
         TILES_HEADER_WORDS + (x * y).div_ceil(32)
     }
 
+    /// Bytes of the candidates as the network reads them; 0 without it.
     pub(crate) fn candidate_bytes(&self) -> u64 {
-        12 * self.pixels()
+        if self.network { 12 * self.pixels() } else { 0 }
     }
 
     /// Bytes of the previous frame's hits; 0 without history.

@@ -37,13 +37,13 @@ pub struct Infill {
     tile_args: Kernel,
     push: Option<Kernel>,
     calibrate: Option<Kernel>,
-    guess: Kernel,
     classical: Kernel,
     network: Option<NetworkKernels>,
 }
 
 #[derive(Debug)]
 struct NetworkKernels {
+    guess: Kernel,
     encode: Kernel,
     pairs: [Kernel; 2],
     fill: Kernel,
@@ -57,7 +57,6 @@ pub struct InfillBuffers {
     args: Buffer,
     gate_args: Buffer,
     params: Buffer,
-    candidates: Buffer,
     history: Option<History>,
     gate: wgpu::BindGroup,
     mark: wgpu::BindGroup,
@@ -65,7 +64,6 @@ pub struct InfillBuffers {
     tile_args: wgpu::BindGroup,
     push: Option<wgpu::BindGroup>,
     calibrate: Option<wgpu::BindGroup>,
-    guess: wgpu::BindGroup,
     classical: wgpu::BindGroup,
     network: Option<NetworkBinds>,
     _scratch: Vec<Buffer>,
@@ -82,6 +80,7 @@ struct History {
 
 #[derive(Debug)]
 struct NetworkBinds {
+    guess: wgpu::BindGroup,
     encode: wgpu::BindGroup,
     pairs: [wgpu::BindGroup; 2],
     fill: wgpu::BindGroup,
@@ -112,9 +111,9 @@ impl Infill {
             tile_args: make(kernels::tile_args()),
             push: sources.neighbours.then(|| make(kernels::push())),
             calibrate: sources.coarse_field.then(|| make(kernels::calibrate(plan))),
-            guess: make(kernels::guess(plan)),
             classical: make(kernels::fill(plan, false)),
             network: plan.network().then(|| NetworkKernels {
+                guess: make(kernels::guess(plan)),
                 encode: make(kernels::encode(plan)),
                 pairs: kernels::pairs().map(make),
                 fill: make(kernels::fill(plan, true)),
@@ -130,9 +129,9 @@ impl Infill {
         all.extend(sources.history.then(kernels::scatter));
         all.extend(sources.neighbours.then(kernels::push));
         all.extend(sources.coarse_field.then(|| kernels::calibrate(plan)));
-        all.extend([kernels::guess(plan), kernels::fill(plan, false)]);
+        all.push(kernels::fill(plan, false));
         if plan.network() {
-            all.push(kernels::encode(plan));
+            all.extend([kernels::guess(plan), kernels::encode(plan)]);
             all.extend(kernels::pairs());
             all.push(kernels::fill(plan, true));
         }
@@ -197,9 +196,9 @@ impl Infill {
         if let (Some(kernel), Some(bind)) = (&self.calibrate, &buffers.calibrate) {
             over(&mut begin_pass(encoder, "infill.calibrate"), kernel, bind, 1);
         }
-        over(&mut begin_pass(encoder, "infill.guess"), &self.guess, &buffers.guess, 0);
         match (method, &self.network, &buffers.network) {
             (Method::Network, Some(kernels), Some(binds)) => {
+                over(&mut begin_pass(encoder, "infill.guess"), &kernels.guess, &binds.guess, 0);
                 over(&mut begin_pass(encoder, "infill.encode"), &kernels.encode, &binds.encode, 2);
                 let labels = ["infill.halves", "infill.quarters"];
                 for ((label, kernel), bind) in labels.iter().zip(&kernels.pairs).zip(&binds.pairs) {
@@ -241,11 +240,6 @@ impl InfillBuffers {
         self.params.as_entire_binding()
     }
 
-    /// Words of the candidates of the holes, three for a pixel: for tests.
-    pub fn candidates(&self) -> &wgpu::Buffer {
-        &self.candidates
-    }
-
     /// Inverted keys of the previous frame's hits: for tests.
     pub fn history_keys(&self) -> Option<&wgpu::Buffer> {
         self.history.as_ref().map(|history| &*history.keys)
@@ -268,6 +262,7 @@ struct Maker<'a> {
 
 /// Memory of the network.
 struct Maps {
+    candidates: Buffer,
     weights: Buffer,
     halves: Buffer,
     quarters: Buffer,
@@ -317,7 +312,6 @@ impl Maker<'_> {
         let args = self.buffer(Category::Scratch, "infill.args", ARGS_BYTES, args_usage);
         let gate_args = self.buffer(Category::Scratch, "infill.gate", GATE_BYTES, args_usage);
         let params = self.uniform("infill.params", size_of::<InfillParams>() as u64);
-        let candidates = self.storage("infill.candidates", plan.candidate_bytes());
         let shared = self.storage("infill.averages", plan.shared_bytes());
         let history = self.history(&params, [depth.clone(), normals.clone()]);
         let keys = history.as_ref().map(|h| h.keys.as_entire_binding());
@@ -345,38 +339,43 @@ impl Maker<'_> {
             params.as_entire_binding(),
             rays.rays().as_entire_binding(),
             tiles.as_entire_binding(),
-            candidates.as_entire_binding(),
         ];
-        let mut guess = pixel.clone();
-        guess.extend(plan.sources().neighbours.then(|| shared.as_entire_binding()));
+        let mut guesses = Vec::new();
+        guesses.extend(plan.sources().neighbours.then(|| shared.as_entire_binding()));
         if plan.sources().coarse_field {
-            guess.extend(coarse_field(ranges));
+            guesses.extend(coarse_field(ranges));
         }
         let mut fill = pixel.clone();
-        fill.extend([normals.clone(), wgpu::BindingResource::TextureView(textures.color_view())]);
+        fill.push(wgpu::BindingResource::TextureView(textures.color_view()));
         fill.extend(keys.clone());
+        let classical = [&fill[..], &guesses[..]].concat();
 
         let mut scratch = Vec::new();
         let network = match &self.stage.network {
             None => None,
             Some(kernels) => {
                 let maps = self.maps(weights.ok_or(Error::NoWeights)?);
+                let candidates = maps.candidates.as_entire_binding();
+                let guess = [&pixel[..], &[candidates.clone()], &guesses[..]].concat();
                 let mut encode = pixel.clone();
                 encode.extend([
+                    candidates.clone(),
                     maps.weights.as_entire_binding(),
                     shared.as_entire_binding(),
                     normals,
                 ]);
                 encode.extend(keys);
-                let mut last = fill.clone();
+                let mut last = fill;
+                last.push(candidates);
                 let inputs = [&maps.weights, &shared, &maps.halves, &maps.quarters];
                 last.extend(inputs.map(|buffer| buffer.as_entire_binding()));
                 let binds = NetworkBinds {
+                    guess: bind(&kernels.guess, "infill.guess", &guess),
                     encode: bind(&kernels.encode, "infill.encode", &encode),
                     pairs: self.pairs(kernels, &maps, [&params, &tiles, &shared]),
                     fill: bind(&kernels.fill, "infill.fill.network", &last),
                 };
-                scratch.extend([maps.weights, maps.halves, maps.quarters]);
+                scratch.extend([maps.candidates, maps.weights, maps.halves, maps.quarters]);
                 Some(binds)
             }
         };
@@ -398,14 +397,12 @@ impl Maker<'_> {
             push: stage.push.as_ref().map(|kernel| bind(kernel, "infill.push", &push)),
             calibrate: (stage.calibrate.as_ref())
                 .map(|kernel| bind(kernel, "infill.calibrate", &calibrate)),
-            guess: bind(&stage.guess, "infill.guess", &guess),
-            classical: bind(&stage.classical, "infill.fill.classical", &fill),
+            classical: bind(&stage.classical, "infill.fill.classical", &classical),
             network,
             tiles,
             args,
             gate_args,
             params,
-            candidates,
             history,
             _scratch: Vec::new(),
         };
@@ -447,6 +444,7 @@ impl Maker<'_> {
         let bytes = bytemuck::cast_slice(&words);
         let ledger = self.ledger;
         Maps {
+            candidates: self.storage("infill.candidates", plan.candidate_bytes()),
             weights: ledger.buffer_with(self.device, category, "infill.weights", usage, bytes),
             halves: self.storage("infill.halves", plan.map_bytes(1, 2)),
             quarters: self.storage("infill.quarters", plan.map_bytes(2, 3)),
@@ -459,7 +457,7 @@ impl Maker<'_> {
         maps: &Maps,
         [params, tiles, encoded]: [&Buffer; 3],
     ) -> [wgpu::BindGroup; 2] {
-        let Maps { weights, halves, quarters } = maps;
+        let Maps { weights, halves, quarters, .. } = maps;
         let ways = [(encoded, halves), (halves, quarters)];
         std::array::from_fn(|i| {
             let (finer, outputs) = ways[i];

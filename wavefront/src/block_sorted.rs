@@ -21,8 +21,7 @@ use lru_cache_gpu::CacheBuffers;
 
 use crate::Error;
 use crate::rays::{
-    FRAME_PARAMS, MASKS, RAYS, RAYS_PER_GROUP, READ, RayBuffers, Rays, SLOTS, WRITE, begin,
-    resources, source,
+    FRAME_PARAMS, MASKS, RAYS, READ, RayBuffers, Rays, SLOTS, WRITE, begin, resources, source,
 };
 use crate::samples::{SampleLayout, Samples};
 use crate::strategy::{MakeResident, Rounds, Scene, Strategy};
@@ -40,6 +39,9 @@ const INTERSECT: Module =
     Module { name: "intersect", source: include_str!("../shader/intersect.wgsl") };
 const COMPOSITE: Module =
     Module { name: "composite", source: include_str!("../shader/composite.wgsl") };
+
+/// Pairs of one workgroup of the kernels that go over pairs.
+const PAIRS_PER_GROUP: u32 = 64;
 
 /// Largest speculation count of the published algorithm.
 const MOST_AHEAD: u32 = 64;
@@ -252,7 +254,7 @@ impl BlockSortedRounds {
             &[stage.plan.capacity as u32, stage.plan.most_ahead, 0, 0],
         );
         let pair_args_bind =
-            kernels.args.bind(device, ledger, (&pairs, 4), RAYS_PER_GROUP, (&pair_args, 0));
+            kernels.args.bind(device, ledger, (&pairs, 4), PAIRS_PER_GROUP, (&pair_args, 0));
         let group_args_bind = kernels.args.bind(
             device,
             ledger,

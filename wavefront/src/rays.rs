@@ -33,8 +33,6 @@ pub(crate) const BLOCK_REQUEST: Module =
 const START: Module = Module { name: "start", source: include_str!("../shader/start.wgsl") };
 const RESOLVE: Module = Module { name: "resolve", source: include_str!("../shader/resolve.wgsl") };
 
-/// Rays of one workgroup of every kernel that goes over rays.
-pub(crate) const RAYS_PER_GROUP: u32 = 64;
 /// Rays of one workgroup of the kernels that start them and that make the sampling mask.
 const RAYS_PER_START_GROUP: u32 = 256;
 

@@ -1,4 +1,4 @@
-//! Twin of `shader/lib/features.wgsl` and `shader/fill.wgsl`: from a picture with holes to a filled one.
+//! Twin of `shader/lib/guesses.wgsl`, `lib/sources.wgsl` and `shader/fill.wgsl`: from a picture with holes to a filled one.
 
 use macrocell::Grid;
 use wavefront::cpu::frame::FrameRay;
