@@ -161,7 +161,8 @@ pub(crate) fn calibrate(plan: &InfillPlan) -> KernelSource {
 
 pub(crate) fn guess(plan: &InfillPlan) -> KernelSource {
     let mut bindings = vec![FRAME, SHADING, PARAMS, READ, READ, READ_WRITE];
-    let constants = guesses(&mut bindings, plan);
+    let mut constants = guesses(&mut bindings, plan);
+    constants.push(("NETWORK", Constant::Bool(true)));
     source("infill.guess", GUESS, bindings, &constants)
 }
 

@@ -21,7 +21,11 @@ fn guesses(pixel: vec2<u32>, number: u32, inside: vec2<u32>, share: f32) -> vec3
 #ifdef NEIGHBOURS
     let average = pull_pixel(inside);
     if (average.weight > 0.0) {
-        let distance = select(0.0, average.t / average.coverage - t_low, average.coverage > 0.0);
+        var distance = 0.0;
+#ifdef NETWORK
+        // Only the network looks at it.
+        distance = select(0.0, average.t / average.coverage - t_low, average.coverage > 0.0);
+#endif
         let normal = shading_safe_normalize(average.normal, to_viewer);
         words.x = candidate_pack(average.coverage / average.weight, normal, distance);
     }
