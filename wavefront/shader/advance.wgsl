@@ -2,6 +2,7 @@
 #import frame
 #import indirect
 #import macrocell_skip
+#import first_block
 #import pairs
 
 @group(0) @binding(0) var<uniform> frame: FrameParams;
@@ -45,11 +46,12 @@ fn main(
     }
     let id = rays[frame_list_word(frame, index)];
     let ray = frame_ray(frame, frame_pixel(frame, id)).ray;
-    let block = frame_unpack(frame, rays[RAYS_HEADER + id]);
+    let grid = macrocell_active(frame.grid);
+    let block = frame_unpack(frame, first_block_state(grid, ray, rays[RAYS_HEADER + id]));
 #ifdef EMPTY_SPACE_STEP
-    rays[RAYS_HEADER + id] = advance(macrocell_active(frame.grid), ray, block, 0u, 0u);
+    rays[RAYS_HEADER + id] = advance(grid, ray, block, 0u, 0u);
 #else
     let count = pairs[PAIRS_SPECULATION];
-    rays[RAYS_HEADER + id] = advance(macrocell_active(frame.grid), ray, block, index * count, count);
+    rays[RAYS_HEADER + id] = advance(grid, ray, block, index * count, count);
 #endif
 }

@@ -113,7 +113,7 @@ fn main(
         }
         if (status == RAY_HIT) {
             resolve(id, state);
-            atomicStore(&rays[RAYS_HEADER + id], RAY_DONE | RAY_HIT);
+            atomicStore(&rays[RAYS_HEADER + id], RAY_SHADED);
             atomicAdd(&hit_count, 1u);
         } else if (status == RAY_DONE) {
             outputs_write_background(frame_pixel(frame, id));

@@ -3,6 +3,7 @@
 #import frame
 #import indirect
 #import macrocell_skip
+#import first_block
 #import lru_keep
 #import lru_lookup
 #import block_samples
@@ -83,8 +84,9 @@ fn main(
     lru_begin_keeping();
     let id = atomicLoad(&rays[frame_list_word(frame, index)]);
     let ray = frame_ray(frame, frame_pixel(frame, id)).ray;
-    let state = atomicLoad(&rays[RAYS_HEADER + id]);
+    let grid = macrocell_active(frame.grid);
+    let state = first_block_state(grid, ray, atomicLoad(&rays[RAYS_HEADER + id]));
     work_begin(listed);
-    atomicStore(&rays[RAYS_HEADER + id], walk(macrocell_active(frame.grid), ray, state));
+    atomicStore(&rays[RAYS_HEADER + id], walk(grid, ray, state));
     work_count();
 }

@@ -3,6 +3,7 @@
 #import frame
 #import indirect
 #import macrocell_skip
+#import first_block
 #import block_samples
 #import block_walk
 #import work
@@ -64,8 +65,9 @@ fn main(
     }
     let id = atomicLoad(&rays[frame_list_word(frame, index)]);
     let ray = frame_ray(frame, frame_pixel(frame, id)).ray;
-    let block = frame_unpack(frame, atomicLoad(&rays[RAYS_HEADER + id]));
+    let grid = macrocell_active(frame.grid);
+    let state = first_block_state(grid, ray, atomicLoad(&rays[RAYS_HEADER + id]));
     work_begin(listed);
-    atomicStore(&rays[RAYS_HEADER + id], walk(macrocell_active(frame.grid), ray, block));
+    atomicStore(&rays[RAYS_HEADER + id], walk(grid, ray, frame_unpack(frame, state)));
     work_count();
 }

@@ -9,7 +9,7 @@ use crate::outputs::ShadingParams;
 use crate::{Error, Outputs};
 
 /// Words before the rays' states, as in `shader/lib/frame.wgsl`.
-pub(crate) const RAYS_HEADER_WORDS: u64 = 12;
+pub(crate) const RAYS_HEADER_WORDS: u64 = 18;
 
 /// Bytes of the indirect arguments of dispatches over the listed rays and over the list itself.
 pub(crate) const ARGS_BYTES: u64 = 32;

@@ -23,6 +23,8 @@ pub(crate) const CELL: Module =
     Module { name: "cell", source: include_str!("../shader/lib/cell.wgsl") };
 const BLOCK_WALK: Module =
     Module { name: "block_walk", source: include_str!("../shader/lib/block_walk.wgsl") };
+const FIRST_BLOCK: Module =
+    Module { name: "first_block", source: include_str!("../shader/lib/first_block.wgsl") };
 const WORK: Module = Module { name: "work", source: include_str!("../shader/lib/work.wgsl") };
 const LIST: Module = Module { name: "list", source: include_str!("../shader/list.wgsl") };
 pub(crate) const BLOCK_NEED: Module =
@@ -110,6 +112,7 @@ pub(crate) fn library(samples: SampleLayout) -> Vec<Module> {
         BLOCK_NEED,
         BLOCK_REQUEST,
         BLOCK_WALK,
+        FIRST_BLOCK,
         WORK,
         samples.module(),
         OUTPUTS,
@@ -206,7 +209,9 @@ impl Rays {
     ) {
         upload.write(device, encoder, &buffers.frame, 0, bytemuck::bytes_of(frame));
         upload.write(device, encoder, &buffers.shading, 0, bytemuck::bytes_of(shading));
-        encoder.clear_buffer(&buffers.rays, 0, Some(4 * RAYS_HEADER_WORDS));
+        // No ray has started.
+        let words = RAYS_HEADER_WORDS + buffers.plan.numbers();
+        encoder.clear_buffer(&buffers.rays, 0, Some(4 * words));
         // A render pass's clearing costs a fraction of as many writes.
         textures.record_unfinished(encoder, shading.unfinished);
         {

@@ -56,9 +56,10 @@ fn frame_zero(loaded: u32) -> u32 {
 
 // Status of a ray in the two upper bits of its state; the lower ones hold its block, those between them
 // a count.
-const RAY_ACTIVE: u32 = 0u;          // waits for its block, or has not started
+const RAY_DONE: u32 = 0u;            // final, without a hit; the whole state of an active ray that has not started
 const RAY_HIT: u32 = 0x40000000u;    // has a hit in its block, not shaded yet
-const RAY_DONE: u32 = 0x80000000u;   // final
+const RAY_ACTIVE: u32 = 0x80000000u; // waits for its block
+const RAY_SHADED: u32 = 0xc0000000u; // final, with a hit
 const RAY_STATUS: u32 = 0xc0000000u;
 const RAY_MOST_MISSES: u32 = 6u; // more would look too far ahead
 
@@ -99,7 +100,8 @@ const RAYS_OPEN_NOW: u32 = 8u; // RAYS_OPEN of the round that is going on
 const RAYS_OPEN: u32 = 9u;     // f32 bits: most voxels in which an active ray's first hit may still lie
 const RAYS_MASKED: u32 = 10u;  // whether the sampling mask says which active rays are listed
 const RAYS_SAMPLED: u32 = 11u; // pixels of the mask
-const RAYS_HEADER: u32 = 12u;
+const RAYS_BOX: u32 = 12u;     // first and last cells of the box of the active blocks, three words each
+const RAYS_HEADER: u32 = 18u;
 
 // The word that holds the active bit of a ray, which is its number's lowest five bits.
 fn frame_active_word(frame: FrameParams, ray: u32) -> u32 {

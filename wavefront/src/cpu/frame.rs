@@ -39,6 +39,9 @@ impl FrameRay {
     }
 }
 
+/// First word of the box of the active blocks, `RAYS_BOX`.
+const BOX_WORD: usize = 12;
+
 /// The rays' states, as read back from [`crate::RayBuffers::rays`].
 #[derive(Clone, Copy, Debug)]
 pub struct RayStates<'a> {
@@ -60,18 +63,29 @@ impl<'a> RayStates<'a> {
         (self.words[first + number / 32] >> (number % 32)) & 1 != 0
     }
 
-    /// The block in which an active ray waits.
+    fn state(&self, pixel: [u32; 2]) -> u32 {
+        self.words[RAYS_HEADER_WORDS as usize + self.order.number(pixel) as usize]
+    }
+
+    /// The block in which an active ray that has started waits.
     pub fn block(&self, pixel: [u32; 2]) -> [i32; 3] {
         let FrameParams { shift_y, shift_z, shift_misses, .. } = *self.frame;
-        let state = self.words[RAYS_HEADER_WORDS as usize + self.order.number(pixel) as usize];
+        let state = self.state(pixel);
         let place = |from: u32, to: u32| ((state & ((1 << to) - 1)) >> from) as i32;
         [place(0, shift_y), place(shift_y, shift_z), place(shift_z, shift_misses)]
     }
 
-    /// Where an active ray enters the block in which it waits: no hit is nearer.
+    /// Where an active ray enters the block in which it waits, or the box of the active blocks if it has not
+    /// started: no hit is nearer.
     pub fn t_low(&self, pixel: [u32; 2]) -> f32 {
         let ray = FrameRay::new(self.frame, pixel).ray;
-        let cell = self.block(pixel).map(|b| 4 * b);
-        ray.entry(CellBox::around(cell, 2, self.frame.grid.last_cell)).t
+        let cells = if self.state(pixel) == 0 {
+            let cell = |first: usize| std::array::from_fn(|a| self.words[first + a] as i32);
+            CellBox { low: cell(BOX_WORD), high: cell(BOX_WORD + 3) }
+        } else {
+            let cell = self.block(pixel).map(|b| 4 * b);
+            CellBox::around(cell, 2, self.frame.grid.last_cell)
+        };
+        ray.entry(cells).t
     }
 }
