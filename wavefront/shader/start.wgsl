@@ -99,8 +99,7 @@ fn main(
     if (first < frame.ray_numbers) {
         // Entering the volume, and their bits.
         var counts = vec2<u32>(RAYS_EACH, (1u << RAYS_EACH) - 1u);
-        // A loop and no condition: software adapters work through a condition that no lane meets.
-        for (var unsure = atomicLoad(&corners_inside) < 4u; unsure; unsure = false) {
+        if (atomicLoad(&corners_inside) < 4u) {
             let volume = DdaBox(vec3<i32>(0), frame.grid.last_cell + vec3<i32>(i32(zero)));
             let corner = frame_pixel(frame, first);
             counts = vec2<u32>(0u);

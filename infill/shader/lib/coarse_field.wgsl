@@ -77,9 +77,8 @@ fn coarse_at(position: vec3<f32>) -> CoarseSample {
     let corners = array<vec3<u32>, 7>(
         vec3<u32>(b.x, a.yz), vec3<u32>(a.x, b.y, a.z), vec3<u32>(b.xy, a.z), vec3<u32>(a.xy, b.z),
         vec3<u32>(b.x, a.y, b.z), vec3<u32>(a.x, b.yz), b);
-    // Most samples lie in one coarse cell. A loop and no condition: software adapters work through a condition that no
-    // lane meets.
-    for (var again = any((a >> vec3<u32>(2u)) != (b >> vec3<u32>(2u))); again; again = false) {
+    // Most samples lie in one coarse cell.
+    if (any((a >> vec3<u32>(2u)) != (b >> vec3<u32>(2u)))) {
         cells[0] = coarse_cell(coarse_cell_of(corners[0]));
         cells[1] = coarse_cell(coarse_cell_of(corners[1]));
         cells[2] = coarse_cell(coarse_cell_of(corners[2]));
