@@ -44,10 +44,14 @@ const FIRST_DENSITY: f64 = 1.0 / 16.0;
 const MOST_STEP: f64 = 0.8;
 /// What a prediction about something entirely new is multiplied by, less 1.
 const CAUTION: f64 = 0.5;
+/// Relative error of predictions before any was compared, the most that one counts as, and how much the newest counts.
+const FIRST_SPREAD: f64 = 0.05;
+const MOST_ERROR: f64 = 0.5;
+const SPREAD_RATE: f64 = 0.1;
 /// Part of a time that is clearly less.
 const CLEARLY_LESS: f64 = 0.9;
 /// Densities between the most and the least that are looked at.
-const CANDIDATES: u32 = 24;
+const CANDIDATES: u32 = 48;
 /// Unusable times in a row after which the clock counts as broken.
 const MOST_UNUSABLE: u32 = 3;
 /// Work of starting a pixel's ray, of filling a pixel and of decoding a coarse cell, in visits of a block.
@@ -110,6 +114,8 @@ pub(crate) struct Budget {
     /// Density and time of the newest frame that was measured, and the density that was chosen last.
     last: Option<(f64, f64)>,
     density: f64,
+    /// Mean size of the newest predictions' relative errors.
+    spread: f64,
     unusable: u32,
     learning_ms: f64,
 }
@@ -127,6 +133,7 @@ impl Budget {
             level: None,
             last: None,
             density: FIRST_DENSITY,
+            spread: FIRST_SPREAD,
             unusable: 0,
             learning_ms: 0.0,
         }
@@ -222,6 +229,10 @@ impl Budget {
         let begin = Instant::now();
         self.unusable = 0;
         self.last = Some((choice.density, ms));
+        if let Some(predicted_ms) = choice.predicted_ms {
+            let error = (ms / predicted_ms).ln().abs().min(MOST_ERROR);
+            self.spread += SPREAD_RATE * (error - self.spread);
+        }
         if choice.work > 0.0 {
             let cost = (ms / choice.work).ln();
             // What is new costs about as much as the first frame did.
@@ -243,7 +254,10 @@ impl Budget {
     fn fitting(&self, outlook: &Outlook, target_ms: f64) -> f64 {
         let cautious_ms = |density: f64| {
             let prediction = self.predict(outlook, density);
-            prediction.map_or(f64::INFINITY, |(ms, novelty)| ms * (1.0 + CAUTION * novelty))
+            // So that about one in twenty of times that scatter like this lies above.
+            let spread = (2.0 * self.spread).exp();
+            prediction
+                .map_or(f64::INFINITY, |(ms, novelty)| ms * (1.0 + CAUTION * novelty) * spread)
         };
         let most = (self.density / MOST_STEP).clamp(LEAST_DENSITY, 1.0);
         let (mut best, mut least_ms) = (LEAST_DENSITY, f64::INFINITY);

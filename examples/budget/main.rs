@@ -88,7 +88,7 @@ impl Set {
     }
 
     fn size(self) -> [u32; 2] {
-        if self == Self::Test { [96, 64] } else { [640, 368] }
+        if self == Self::Test { [96, 64] } else { [1280, 720] }
     }
 }
 

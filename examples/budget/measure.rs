@@ -12,8 +12,6 @@ use crate::sequence::View;
 use crate::support::{Failure, Gpu, median};
 
 const BUDGET_BYTES: u64 = 1 << 30;
-/// Every so many frames' full times make the target.
-const EVERY: usize = 5;
 /// Frames after which predictions count.
 const LEARNING_FRAMES: usize = 20;
 
@@ -152,11 +150,11 @@ pub fn run(
     let target_ms = match target_ms {
         Some(target_ms) => target_ms,
         None => {
-            let full = views.iter().step_by(EVERY).map(|view| {
-                let frame = scene.frame(view, 1e6);
-                let (gpu, renderer) = &mut renderers[0];
-                Ok(show(gpu, renderer, &frame, 1)?.ms)
-            });
+            // On a renderer of its own, so that all modes start with nothing decoded.
+            let (gpu, mut renderer) = of(&MODES[0])?;
+            let full = views
+                .iter()
+                .map(|view| Ok(show(&gpu, &mut renderer, &scene.frame(view, 1e6), 1)?.ms));
             0.5 * median(full.collect::<Result<Vec<_>, Failure>>()?.into_iter())
         }
     };
