@@ -262,7 +262,8 @@ impl Budget {
         let most = (self.density / MOST_STEP).clamp(LEAST_DENSITY, 1.0);
         let (mut best, mut least_ms) = (LEAST_DENSITY, f64::INFINITY);
         for i in 0..=CANDIDATES {
-            let density = most * (LEAST_DENSITY / most).powf(f64::from(i) / f64::from(CANDIDATES));
+            let share = f64::from(i) / f64::from(CANDIDATES);
+            let density = (most * (LEAST_DENSITY / most).powf(share)).max(LEAST_DENSITY);
             let ms = cautious_ms(density);
             if ms <= target_ms {
                 return density;
@@ -362,6 +363,7 @@ fn noise(seed: u64) -> impl FnMut() -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
     use wavefront::Camera;
 
     const SIZE: [u32; 2] = [640, 360];
@@ -457,6 +459,58 @@ mod tests {
                 assert_eq!(density.to_bits(), 1.0_f64.to_bits(), "{broken}: {shown:?}");
             }
             assert!(shown[39].0 < 0.5, "{broken}: {shown:?}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn whatever_frames_take_a_density_is_one_and_rises_slowly(
+            mode in prop::sample::select(vec![BudgetMode::Predicted, BudgetMode::LastFrame]),
+            target_ms in 0.1..300.0,
+            fixed_ms in 0.01..100.0,
+            all_rays_ms in 0.0..1e3,
+            fills in any::<bool>(),
+            seed in any::<u64>(),
+        ) {
+            let scatter = std::cell::RefCell::new(noise(seed));
+            // Every tenth frame or so takes ten times as long.
+            let cost = |density: f64, _| {
+                let factor = if scatter.borrow_mut()() > 0.9 { 10.0 } else { 1.0 };
+                (fixed_ms + all_rays_ms * density) * factor
+            };
+            let shown = show(&mut budget(mode), 60, target_ms, fills, cost);
+            prop_assert!(shown.iter().all(|(density, _)| (LEAST_DENSITY..=1.0).contains(density)), "{shown:?}");
+            for pair in shown.windows(2) {
+                prop_assert!(pair[1].0 <= pair[0].0 / MOST_STEP * (1.0 + 1e-9), "{pair:?}");
+            }
+        }
+
+        #[test]
+        fn a_target_within_reach_is_kept(
+            target_ms in 1.0..300.0,
+            fixed_share in 0.02..0.6,
+            density in 0.04..0.9,
+        ) {
+            let fixed_ms = fixed_share * target_ms;
+            let cost = |chosen: f64, _| fixed_ms + (target_ms - fixed_ms) * chosen / density;
+            let shown = show(&mut budget(BudgetMode::Predicted), 80, target_ms, false, cost);
+            for (i, (chosen, ms)) in shown.iter().enumerate().skip(40) {
+                prop_assert!(*ms <= 1.1 * target_ms, "frame {i}: {ms} of {target_ms} ms, density {chosen}");
+                prop_assert!(*ms >= 0.6 * target_ms, "frame {i}: {ms} of {target_ms} ms, density {chosen}");
+            }
+        }
+
+        #[test]
+        fn a_clock_that_stays_unusable_ends_adaptation(
+            mode in prop::sample::select(vec![BudgetMode::Predicted, BudgetMode::LastFrame, BudgetMode::TwoPass]),
+            broken in prop::sample::select(vec![0.0, -1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY]),
+            from in 0_u32..20,
+        ) {
+            let cost = |density: f64, number| if number >= from { broken } else { 100.0 * density };
+            let shown = show(&mut budget(mode), from + 8, 20.0, false, cost);
+            for (density, _) in &shown[from as usize + MOST_UNUSABLE as usize..] {
+                prop_assert_eq!(density.to_bits(), 1.0_f64.to_bits(), "{:?}", shown);
+            }
         }
     }
 

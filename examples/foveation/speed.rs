@@ -159,20 +159,6 @@ impl Clocked {
         let ms = start.elapsed().as_secs_f64() * 1e3;
         let share = |count: u32| f64::from(count) / f64::from(report.rays);
         (self.sampled, self.entered) = (share(report.sampled_rays), share(report.entered_rays));
-        #[cfg(feature = "wgpu-profiler")]
-        if run == 2 && std::env::var("STAGES").is_ok() {
-            println!(
-                "{} {ms:.1}: {}",
-                self.filler.way.name,
-                self.filler
-                    .renderer
-                    .stage_times()
-                    .iter()
-                    .map(|s| format!("{} {:.1}", s.label, s.ms))
-                    .collect::<Vec<_>>()
-                    .join(", ")
-            );
-        }
         if run > 0 {
             self.ms.push(ms);
         }

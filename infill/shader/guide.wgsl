@@ -3,6 +3,7 @@
 #import infill_params
 #import infill_rays
 #import macrocell_skip
+#import first_block
 #import block_need
 #import block_request
 #import march
@@ -29,8 +30,7 @@ fn macrocell_mask(index: u32) -> vec2<u32> {
 }
 
 // The active blocks from where the ray waits to where it crosses the coarse field.
-fn guide(ray: DdaRay, first: vec3<i32>, t_end: f32, most_blocks: u32) {
-    let grid = macrocell_active(frame.grid);
+fn guide(grid: MacrocellGrid, ray: DdaRay, first: vec3<i32>, t_end: f32, most_blocks: u32) {
     var place = macrocell_enter(grid, ray, first);
     for (var count = 0u; count < most_blocks; count++) {
         place = macrocell_advance(grid, ray, place);
@@ -65,7 +65,8 @@ fn main(
     let t_low = infill_t_low(ray, number);
     let march = march(ray, infill_volume(), t_low, frame.isovalue, MIDPOINT, MARCH_MOST_STEPS + zero);
     if (any(march.hit)) {
-        let first = frame_unpack(frame, rays[RAYS_HEADER + number]);
-        guide(ray, first, select(march.t.y, march.t.x, march.hit.x), MOST_BLOCKS + zero);
+        let grid = macrocell_active(frame.grid);
+        let state = first_block_state(grid, ray, rays[RAYS_HEADER + number]);
+        guide(grid, ray, frame_unpack(frame, state), select(march.t.y, march.t.x, march.hit.x), MOST_BLOCKS + zero);
     }
 }

@@ -356,7 +356,7 @@ impl Maker<'_> {
             Some(kernels) => {
                 let maps = self.maps(weights.ok_or(Error::NoWeights)?);
                 let candidates = maps.candidates.as_entire_binding();
-                let guess = [&pixel[..], &[candidates.clone()], &guesses[..]].concat();
+                let guess = [&pixel[..], std::slice::from_ref(&candidates), &guesses[..]].concat();
                 let mut encode = pixel.clone();
                 encode.extend([
                     candidates.clone(),

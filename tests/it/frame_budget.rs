@@ -1,9 +1,11 @@
 //! Frames held to a time: fewer rays in the first pass, the same picture in the end, within the budget of bytes.
 
 use progressive_iso::{
-    BudgetMode, Error, Frame, FrameOptions, Infill, InfillOptions, PassReport, PixelStatus,
-    RendererOptions, Residency,
+    BudgetMode, Capture, Error, Frame, FrameOptions, Infill, InfillOptions, PassReport,
+    PixelStatus, ProgressiveIsoRenderer, RendererOptions, Residency,
 };
+
+use proptest::prelude::*;
 
 use crate::support::{Gpu, Scene, options};
 
@@ -23,45 +25,84 @@ fn frame(scene: &Scene, azimuth: f64, target_ms: Option<f32>) -> Frame {
     Frame { options, ..frame }
 }
 
+/// What a renderer is asked for, frame by frame.
+#[derive(Clone, Debug)]
+struct Case {
+    mode: BudgetMode,
+    residency: Residency,
+    /// Azimuth in degrees and milliseconds.
+    frames: Vec<(f64, f32)>,
+}
+
+fn cases() -> impl Strategy<Value = Case> {
+    let mode = prop::sample::select(MODES.to_vec());
+    let residency = prop::sample::select(vec![Residency::Cached, Residency::Full]);
+    let target_ms = (-3.0_f32..3.0).prop_map(|power| 10.0_f32.powf(power));
+    let frames = prop::collection::vec((0.0..90.0, target_ms), 1..4);
+    (mode, residency, frames).prop_map(|(mode, residency, frames)| Case { mode, residency, frames })
+}
+
+/// Renders a frame to its end; the reports of its passes.
+fn check_frame(
+    gpu: &Gpu,
+    renderer: &mut ProgressiveIsoRenderer,
+    frame: &Frame,
+    expected: &Capture,
+) -> Result<Vec<PassReport>, TestCaseError> {
+    let expected_status = expected.status.as_ref().unwrap();
+    let bytes = renderer.plan().bytes();
+    renderer.set_frame(frame).unwrap();
+    let mut reports: Vec<PassReport> = Vec::new();
+    loop {
+        let (device, queue) = (&gpu.device, &gpu.queue);
+        let report = renderer.render_to_completion(device, queue, |_, _| false).unwrap();
+        prop_assert!(report.peak_bytes <= bytes, "{report:?}");
+        let shown = renderer.capture_blocking(device, queue).unwrap();
+        for (i, status) in shown.status.as_ref().unwrap().iter().enumerate() {
+            if *status != PixelStatus::Unfinished {
+                prop_assert_eq!(*status, expected_status[i], "pixel {}", i);
+                let colors = [&shown.color, &expected.color].map(|c| &c[4 * i..4 * i + 4]);
+                prop_assert_eq!(colors[0], colors[1], "pixel {}", i);
+            }
+        }
+        reports.push(report);
+        if report.complete() {
+            prop_assert_eq!(&shown.color, &expected.color);
+            return Ok(reports);
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(12))]
+    #[test]
+    fn frames_that_are_held_to_a_time_end_with_the_same_picture_within_the_budget(case in cases()) {
+        let (gpu, scene) = (Gpu::new(), Scene::generated("turbulence", [45, 41, 38], 8.0));
+        let plain = RendererOptions { residency: Residency::Cached, ..options(SIZE) };
+        let mut reference = gpu.renderer(&scene, plain);
+        let mut renderer = gpu.renderer(&scene, held(case.mode, case.residency));
+        for (azimuth, target_ms) in case.frames {
+            let expected = gpu.finish(&mut reference, &frame(&scene, azimuth, None));
+            check_frame(&gpu, &mut renderer, &frame(&scene, azimuth, Some(target_ms)), &expected)?;
+        }
+    }
+}
+
 #[test]
-fn a_frame_that_is_held_to_a_time_ends_with_the_same_picture() {
+fn a_target_out_of_reach_restricts_the_first_pass() {
     let (gpu, scene) = (Gpu::new(), Scene::generated("turbulence", [45, 41, 38], 8.0));
     let plain = RendererOptions { residency: Residency::Cached, ..options(SIZE) };
     let mut reference = gpu.renderer(&scene, plain);
+    let expected = gpu.finish(&mut reference, &frame(&scene, 20.0, None));
     for residency in [Residency::Cached, Residency::Full] {
         for mode in MODES {
             let mut renderer = gpu.renderer(&scene, held(mode, residency));
-            let bytes = renderer.plan().bytes();
-            for azimuth in [20.0, 23.0, 80.0] {
-                let expected = gpu.finish(&mut reference, &frame(&scene, azimuth, None));
-                let expected_status = expected.status.as_ref().unwrap();
-                renderer.set_frame(&frame(&scene, azimuth, Some(1e-3))).unwrap();
-                let mut reports: Vec<PassReport> = Vec::new();
-                loop {
-                    let (device, queue) = (&gpu.device, &gpu.queue);
-                    let report =
-                        renderer.render_to_completion(device, queue, |_, _| false).unwrap();
-                    assert!(report.peak_bytes <= bytes, "{mode:?} {residency:?}: {report:?}");
-                    let shown = renderer.capture_blocking(device, queue).unwrap();
-                    for (i, status) in shown.status.as_ref().unwrap().iter().enumerate() {
-                        if *status != PixelStatus::Unfinished {
-                            assert_eq!(*status, expected_status[i]);
-                            let colors =
-                                [&shown.color, &expected.color].map(|c| &c[4 * i..4 * i + 4]);
-                            assert_eq!(colors[0], colors[1], "{mode:?} {residency:?}: pixel {i}");
-                        }
-                    }
-                    reports.push(report);
-                    if report.complete() {
-                        assert_eq!(shown.color, expected.color, "{mode:?} {residency:?}");
-                        break;
-                    }
-                }
-                let first = reports.iter().find(|report| report.pass == 1).unwrap();
-                let restricts = mode != BudgetMode::Fixed;
-                assert_eq!(first.density < 1.0, restricts, "{mode:?} {residency:?}: {first:?}");
-                assert_eq!(first.sampled_rays < first.rays, restricts, "{first:?}");
-            }
+            let wanted = frame(&scene, 20.0, Some(1e-3));
+            let reports = check_frame(&gpu, &mut renderer, &wanted, &expected).unwrap();
+            let first = reports.iter().find(|report| report.pass == 1).unwrap();
+            let restricts = mode != BudgetMode::Fixed;
+            assert_eq!(first.density < 1.0, restricts, "{mode:?} {residency:?}: {first:?}");
+            assert_eq!(first.sampled_rays < first.rays, restricts, "{first:?}");
         }
     }
 }
@@ -86,7 +127,7 @@ fn times_are_predicted_once_something_was_measured() {
 fn a_target_that_was_not_planned_or_is_no_time_is_refused() {
     let (gpu, scene) = (Gpu::new(), Scene::generated("turbulence", [45, 41, 38], 8.0));
     let mut plain = gpu.renderer(&scene, options(SIZE));
-    let part = |renderer: &progressive_iso::ProgressiveIsoRenderer| {
+    let part = |renderer: &ProgressiveIsoRenderer| {
         let parts = renderer.plan().parts();
         parts.iter().find(|part| part.name == "frame budget").unwrap().clone()
     };

@@ -184,4 +184,12 @@ fn pictures_of_more_rays_than_the_list_holds_are_finished() {
     let of = |wanted| status.iter().filter(|&&s| s == wanted).count() as u32;
     assert_eq!(of(PixelStatus::Unfinished), 0);
     assert!(of(PixelStatus::Hit) == report.hits && report.hits > 1_000_000, "{report:?}");
+    // With a cache the rays of the second list are known before anything is requested for them.
+    let options = RendererOptions { size, outputs, ..with(Residency::Cached) };
+    let mut renderer = gpu.renderer(&scene, options);
+    let cached = gpu.finish(&mut renderer, &frame);
+    let report = renderer.poll_report();
+    assert_eq!(cached.color, picture.color);
+    // Requests for rays that have not started, if they took their states for places, decode 18.
+    assert!(report.blocks_decoded <= 12, "{report:?}");
 }

@@ -2,6 +2,7 @@
 #import frame
 #import indirect
 #import macrocell_skip
+#import first_block
 #import block_need
 #import block_request
 
@@ -62,8 +63,10 @@ fn main(
     lru_begin_keeping();
     let id = rays[frame_list_word(frame, index)];
     let ray = frame_ray(frame, frame_pixel(frame, id)).ray;
-    let state = rays[RAYS_HEADER + id];
+    let grid = macrocell_active(frame.grid);
+    // Rays that the round before had no room for have not started.
+    let state = first_block_state(grid, ray, rays[RAYS_HEADER + id]);
     let least = frame.look_ahead + frame_zero(id);
     let count = look_ahead(frame_count(frame, state), least);
-    request_ahead(macrocell_active(frame.grid), ray, frame_unpack(frame, state), count, index == 0u);
+    request_ahead(grid, ray, frame_unpack(frame, state), count, index == 0u);
 }

@@ -16,8 +16,10 @@ pub enum Error {
         /// Which matrix.
         what: &'static str,
     },
-    /// The projection's w must depend on view depth alone.
-    #[error("the last row of clip_from_view is {row:?}; its x and y must be 0")]
+    /// The projection's w must depend on view depth alone and not be 0 where the volume is.
+    #[error(
+        "the last row of clip_from_view is {row:?}; its x and y must be 0, and z and w such that no depth at which the volume is gives 0"
+    )]
     UnsupportedProjection {
         /// Last row.
         row: [f64; 4],

@@ -138,7 +138,8 @@ impl FrameView {
     /// world space.
     ///
     /// # Errors
-    /// If a matrix is not finite or cannot be inverted, or the projection's w depends on x or y.
+    /// If a matrix is not finite or cannot be inverted, the projection's w depends on x or y, or it is 0 at a depth
+    /// where the volume is: rays would run through one point inside of it.
     pub fn new(
         camera: &Camera,
         size: [u32; 2],
@@ -151,7 +152,13 @@ impl FrameView {
         let view_from_index = view_from_world * world_from_index;
         let index_from_view = inverse("view_from_index", view_from_index)?;
         let [base, slope] = unproject(clip_from_view)?;
-        let start_depth = start_depth(view_from_index, clip_from_view, dims);
+        let [nearest, farthest] = depths(view_from_index, dims);
+        let start_depth = start_depth([nearest, farthest], clip_from_view);
+        let row = clip_from_view.row(3);
+        let w = |depth: f64| row.w - row.z * depth;
+        if w(start_depth) * w(farthest.max(start_depth)) <= 0.0 {
+            return Err(Error::UnsupportedProjection { row: row.to_array() });
+        }
         // Per pixel: clip x grows by 2 / width to the right, clip y falls by 2 / height downwards.
         let steps = [2.0 / f64::from(size[0]), -2.0 / f64::from(size[1])];
         let per_pixel = |v: [DVec3; 3]| [v[0], v[1] * steps[0], v[2] * steps[1]];
@@ -301,8 +308,8 @@ fn unproject(clip_from_view: DMat4) -> Result<[[DVec3; 3]; 2], Error> {
     if finite { Ok([base, slope]) } else { Err(Error::Singular { what: "clip_from_view" }) }
 }
 
-/// The near plane's view depth, or a plane just before the volume where that is farther.
-fn start_depth(view_from_index: DMat4, clip_from_view: DMat4, dims: [u32; 3]) -> f64 {
+/// Least and greatest view depth of the volume's corners.
+fn depths(view_from_index: DMat4, dims: [u32; 3]) -> [f64; 2] {
     let last = DVec3::from(dims.map(|d| f64::from(d) - 1.0));
     let depths = (0..8u32).map(|corner| {
         let pick = |axis: u32| f64::from((corner >> axis) & 1);
@@ -314,6 +321,11 @@ fn start_depth(view_from_index: DMat4, clip_from_view: DMat4, dims: [u32; 3]) ->
         nearest = nearest.min(depth);
         farthest = farthest.max(depth);
     }
+    [nearest, farthest]
+}
+
+/// The near plane's view depth, or a plane just before the volume where that is farther.
+fn start_depth([nearest, farthest]: [f64; 2], clip_from_view: DMat4) -> f64 {
     // A hundredth of the extent, so that rounding to f32 cannot put a start inside the volume.
     let before = nearest - 0.01 * (farthest - nearest);
     before.max(near_depth(clip_from_view))
@@ -337,6 +349,19 @@ fn near_depth(clip_from_view: DMat4) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_projection_whose_rays_meet_in_the_volume_is_refused() {
+        let (size, dims) = ([64, 64], [40, 40, 40]);
+        let world = DMat4::IDENTITY.to_cols_array_2d();
+        let camera = Camera::orbit([20.0; 3], 100.0, 25.0, 40.0, 50.0, 1.0);
+        FrameView::new(&camera, size, world, dims).unwrap();
+        // w = 240 - depth, where the volume reaches from about 205 on.
+        let mut clip = camera.clip_from_view;
+        (clip[2][3], clip[3][3]) = (1.0, 240.0);
+        let found = FrameView::new(&Camera { clip_from_view: clip, ..camera }, size, world, dims);
+        assert!(matches!(found, Err(Error::UnsupportedProjection { .. })), "{found:?}");
+    }
 
     #[test]
     fn a_point_on_a_ray_comes_back_to_its_pixel() {

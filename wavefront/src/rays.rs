@@ -23,7 +23,7 @@ pub(crate) const CELL: Module =
     Module { name: "cell", source: include_str!("../shader/lib/cell.wgsl") };
 const BLOCK_WALK: Module =
     Module { name: "block_walk", source: include_str!("../shader/lib/block_walk.wgsl") };
-const FIRST_BLOCK: Module =
+pub(crate) const FIRST_BLOCK: Module =
     Module { name: "first_block", source: include_str!("../shader/lib/first_block.wgsl") };
 const WORK: Module = Module { name: "work", source: include_str!("../shader/lib/work.wgsl") };
 const LIST: Module = Module { name: "list", source: include_str!("../shader/list.wgsl") };

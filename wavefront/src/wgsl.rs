@@ -8,6 +8,9 @@ use crate::rays;
 /// A frame's camera, grids and rays, and where the rays' states lie.
 pub const FRAME: Module = rays::FRAME;
 
+/// The state of rays that have not started.
+pub const FIRST_BLOCK: Module = rays::FIRST_BLOCK;
+
 /// Shading of a surface.
 pub const SHADING: Module = outputs::SHADING;
 
@@ -22,7 +25,7 @@ pub const BLOCK_REQUEST: Module = rays::BLOCK_REQUEST;
 
 /// Everything a kernel needs to import from this crate, with what that imports.
 pub fn modules() -> Vec<Module> {
-    let mut modules = vec![FRAME, SHADING, CELL, BLOCK_NEED, BLOCK_REQUEST];
+    let mut modules = vec![FRAME, FIRST_BLOCK, SHADING, CELL, BLOCK_NEED, BLOCK_REQUEST];
     modules.extend(macrocell::wgsl::MODULES);
     modules.extend(lru_cache_gpu::wgsl::MODULES);
     modules

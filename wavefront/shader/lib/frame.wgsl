@@ -56,7 +56,7 @@ fn frame_zero(loaded: u32) -> u32 {
 
 // Status of a ray in the two upper bits of its state; the lower ones hold its block, those between them
 // a count.
-const RAY_DONE: u32 = 0u;            // final, without a hit; the whole state of an active ray that has not started
+const RAY_DONE: u32 = 0u;            // final, without a hit; between rounds, the whole state of an active ray that has not started
 const RAY_HIT: u32 = 0x40000000u;    // has a hit in its block, not shaded yet
 const RAY_ACTIVE: u32 = 0x80000000u; // waits for its block
 const RAY_SHADED: u32 = 0xc0000000u; // final, with a hit
