@@ -16,9 +16,9 @@ pub enum Error {
         /// Which matrix.
         what: &'static str,
     },
-    /// The projection's w must depend on view depth alone and not be 0 where the volume is.
+    /// The projection's w must depend on view depth alone and not change sign where the volume is.
     #[error(
-        "the last row of clip_from_view is {row:?}; its x and y must be 0, and z and w such that no depth at which the volume is gives 0"
+        "the last row of clip_from_view is {row:?}; its x and y must be 0, and w - z * depth must keep its sign where the volume is"
     )]
     UnsupportedProjection {
         /// Last row.

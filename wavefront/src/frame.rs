@@ -138,7 +138,7 @@ impl FrameView {
     /// world space.
     ///
     /// # Errors
-    /// If a matrix is not finite or cannot be inverted, the projection's w depends on x or y, or it is 0 at a depth
+    /// If a matrix is not finite or cannot be inverted, the projection's w depends on x or y, or it changes sign
     /// where the volume is: rays would run through one point inside of it.
     pub fn new(
         camera: &Camera,
@@ -156,7 +156,7 @@ impl FrameView {
         let start_depth = start_depth([nearest, farthest], clip_from_view);
         let row = clip_from_view.row(3);
         let w = |depth: f64| row.w - row.z * depth;
-        if w(start_depth) * w(farthest.max(start_depth)) <= 0.0 {
+        if w(start_depth) * w(farthest.max(start_depth)) < 0.0 {
             return Err(Error::UnsupportedProjection { row: row.to_array() });
         }
         // Per pixel: clip x grows by 2 / width to the right, clip y falls by 2 / height downwards.
