@@ -1,6 +1,7 @@
 // The sampling mask of a pass: a bit for every ray that may be cast, kept from pass to pass of a frame.
 #import frame
 #import indirect
+#import ray_quads
 
 struct SamplingParams {
     gaze: vec2<f32>, // in shares of width and height
@@ -17,10 +18,6 @@ struct SamplingParams {
 @group(0) @binding(3) var<storage, read> tiles: array<u32>; // two ranks a word
 @group(0) @binding(4) var<storage, read_write> sampling_mask: array<u32>;
 
-// Rays of one invocation, whose numbers follow each other: 2x2 pixels.
-const RAYS_EACH: u32 = 4u;
-
-var<workgroup> drawn: array<atomic<u32>, 8>;
 var<workgroup> added: atomic<u32>;
 
 fn tile_rank(pixel: vec2<u32>) -> u32 {
@@ -51,26 +48,24 @@ fn main(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    if (lane < 8u) {
-        atomicStore(&drawn[lane], 0u);
-    }
+    quad_begin(lane);
     if (lane == 0u) {
         atomicStore(&added, 0u);
     }
     workgroupBarrier();
-    let first = (indirect_linear_group(group, groups) * 64u + lane) * RAYS_EACH;
+    let first = (indirect_linear_group(group, groups) * 64u + lane) * QUAD_RAYS;
     let corner = frame_pixel(frame, first);
     var bits = 0u;
-    for (var i = 0u; i < RAYS_EACH; i++) {
-        let pixel = corner + vec2<u32>(i & 1u, i >> 1u);
+    for (var i = 0u; i < QUAD_RAYS; i++) {
+        let pixel = quad_pixel(corner, i);
         let inside = first < frame.ray_numbers && pixel.x < frame.width && pixel.y < frame.height;
         bits |= select(0u, 1u << i, inside && is_drawn(pixel));
     }
-    atomicOr(&drawn[lane >> 3u], bits << (RAYS_EACH * (lane & 7u)));
+    quad_add(lane, bits);
     workgroupBarrier();
-    if ((lane & 7u) == 0u && first < frame.ray_numbers) {
+    if (quad_leads(lane) && first < frame.ray_numbers) {
         let before = sampling_mask[first >> 5u];
-        let now = before | atomicLoad(&drawn[lane >> 3u]);
+        let now = before | quad_word(lane);
         sampling_mask[first >> 5u] = now;
         atomicAdd(&added, countOneBits(now ^ before));
     }

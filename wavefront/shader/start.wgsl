@@ -4,6 +4,7 @@
 #import indirect
 #import macrocell_skip
 #import outputs
+#import ray_quads
 
 @group(0) @binding(0) var<uniform> frame: FrameParams;
 @group(0) @binding(1) var<uniform> shading: ShadingParams;
@@ -20,16 +21,13 @@
 @group(0) @binding(STATUS_BINDING) var status_out: texture_storage_2d<r32uint, write>;
 #endif
 
-// Rays of one invocation, whose numbers follow each other: 2x2 pixels. Those of a workgroup are 16x16 pixels, unless the
-// picture is tiny.
-const RAYS_EACH: u32 = 4u;
+// Pixels on the edge of a workgroup's tile, unless the picture is tiny.
 const TILE: u32 = 16u;
 
 // Voxels inside a box: rays that are rounded differently from one another are not as far apart. A crossing's error is below
 // 2^-4 voxels while rays that meet the volume start within 2^16 voxels of it: eight roundings of 2^-24.
 const MARGIN: i32 = 1;
 
-var<workgroup> active_bits: array<atomic<u32>, 8>;
 var<workgroup> entered: atomic<u32>;
 var<workgroup> corners_inside: atomic<u32>;
 
@@ -79,15 +77,13 @@ fn main(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    if (lane < 8u) {
-        atomicStore(&active_bits[lane], 0u);
-    }
+    quad_begin(lane);
     if (lane == 0u) {
         atomicStore(&entered, 0u);
         atomicStore(&corners_inside, 0u);
     }
     workgroupBarrier();
-    let number = indirect_linear_group(group, groups) * 64u * RAYS_EACH;
+    let number = indirect_linear_group(group, groups) * 64u * QUAD_RAYS;
     let zero = frame_zero(atomicLoad(&rays[RAYS_HITS]));
     let grid = macrocell_active(frame.grid);
     let box = DdaBox(4 * grid.first_block, grid.last_cell);
@@ -95,28 +91,28 @@ fn main(
         count_corner(frame_pixel(frame, number), box, lane);
     }
     workgroupBarrier();
-    let first = number + lane * RAYS_EACH;
+    let first = number + lane * QUAD_RAYS;
     if (first < frame.ray_numbers) {
         // Entering the volume, and their bits.
-        var counts = vec2<u32>(RAYS_EACH, (1u << RAYS_EACH) - 1u);
+        var counts = vec2<u32>(QUAD_RAYS, (1u << QUAD_RAYS) - 1u);
         if (atomicLoad(&corners_inside) < 4u) {
             let volume = DdaBox(vec3<i32>(0), frame.grid.last_cell + vec3<i32>(i32(zero)));
             let corner = frame_pixel(frame, first);
             counts = vec2<u32>(0u);
-            for (var i = 0u; i < RAYS_EACH + zero; i++) {
-                let pixel = corner + vec2<u32>(i & 1u, i >> 1u);
+            for (var i = 0u; i < QUAD_RAYS + zero; i++) {
+                let pixel = quad_pixel(corner, i);
                 if (pixel.x < frame.width && pixel.y < frame.height) {
                     let started = start(pixel, volume, box);
                     counts += vec2<u32>(started.x, started.y << i);
                 }
             }
         }
-        atomicOr(&active_bits[lane >> 3u], counts.y << (RAYS_EACH * (lane & 7u)));
+        quad_add(lane, counts.y);
         atomicAdd(&entered, counts.x);
     }
     workgroupBarrier();
-    if ((lane & 7u) == 0u && first < frame.ray_numbers) {
-        atomicStore(&rays[frame_active_word(frame, first)], atomicLoad(&active_bits[lane >> 3u]));
+    if (quad_leads(lane) && first < frame.ray_numbers) {
+        atomicStore(&rays[frame_active_word(frame, first)], quad_word(lane));
     }
     if (lane == 0u) {
         atomicAdd(&rays[RAYS_ENTERED], atomicLoad(&entered));

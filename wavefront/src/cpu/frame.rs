@@ -40,7 +40,7 @@ impl FrameRay {
 }
 
 /// First word of the box of the active blocks, `RAYS_BOX`.
-const BOX_WORD: usize = 12;
+const BOX_WORD: usize = size_of::<crate::Counters>() / 4;
 
 /// The rays' states, as read back from [`crate::RayBuffers::rays`].
 #[derive(Clone, Copy, Debug)]
