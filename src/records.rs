@@ -263,7 +263,7 @@ impl PassRecords {
         let rounds_before = if same_frame { self.report.rounds } else { 0 };
         let cut_before = if same_frame { self.report.cut_walks } else { 0 };
         let rounds = rounds.saturating_sub(rounds_before);
-        self.schedule.take(rounds, ms);
+        self.schedule.take(info.pass == 1, rounds, ms);
         let in_force = info.most_cells == self.schedule.most_cells();
         if rounds > 0 && cut != cut_before && in_force {
             self.schedule.calibrate(ms / f64::from(rounds), info.pass_ms);

@@ -389,7 +389,8 @@ impl ProgressiveIsoRenderer {
         state.passes += 1;
         let options = &state.frame.options;
         let pass_ms = options.pass_ms.min(options.target_ms.unwrap_or(f32::INFINITY));
-        for _ in 0..self.records.schedule.rounds(options.rounds_per_pass, pass_ms) {
+        let first = state.passes == 1;
+        for _ in 0..self.records.schedule.rounds(first, options.rounds_per_pass, pass_ms) {
             state.rounds += 1;
             let _span =
                 tracing::debug_span!("progressive_iso.round", round = state.rounds).entered();

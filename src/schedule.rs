@@ -7,6 +7,8 @@ use wavefront::FrameParams;
 pub(crate) struct Schedule {
     /// Milliseconds that a round took lately; `None` before anything was measured.
     round_ms: Option<f64>,
+    /// Rounds in which the first pass of the newest frame had something to do; `None` before there was one.
+    first_rounds: Option<u32>,
     /// Cells that a walk may visit; `None` before anything was measured.
     most_cells: Option<u32>,
 }
@@ -27,15 +29,17 @@ const MOST_FACTOR: f64 = 2.0;
 const MEMORY: f64 = 0.7;
 
 impl Schedule {
-    /// Rounds of the next pass: at least 1, at most `most`, and no more than fit `pass_ms`.
-    pub(crate) fn rounds(&self, most: u32, pass_ms: f32) -> u32 {
+    /// Rounds of the next pass: at least 1, at most `most`, and no more than fit `pass_ms`. The `first` of a frame
+    /// has but one more than the frame before had to do, since every round costs dispatches, empty ones, too.
+    pub(crate) fn rounds(&self, first: bool, most: u32, pass_ms: f32) -> u32 {
         let most = most.max(1);
         if pass_ms == f32::INFINITY {
             return most;
         }
         // A pass of one round comes first, so that something is measured.
-        let fitting = self.round_ms.map_or(1.0, |ms| f64::from(pass_ms) / ms.max(1e-3));
-        (fitting as u32).clamp(1, most)
+        let fitting = self.round_ms.map_or(1.0, |ms| f64::from(pass_ms) / ms.max(1e-3)) as u32;
+        let needed = self.first_rounds.filter(|_| first).map_or(u32::MAX, |n| n.saturating_add(1));
+        fitting.min(needed).clamp(1, most)
     }
 
     /// Cells that the walks of the next frame may visit each.
@@ -53,8 +57,11 @@ impl Schedule {
         }
     }
 
-    /// Takes in what a pass of `rounds` rounds took.
-    pub(crate) fn take(&mut self, rounds: u32, ms: f64) {
+    /// Takes in what a pass took that had something to do in `rounds` rounds; `first`: of a frame.
+    pub(crate) fn take(&mut self, first: bool, rounds: u32, ms: f64) {
+        if first {
+            self.first_rounds = Some(rounds);
+        }
         if rounds > 0 && ms.is_finite() {
             let newest = ms / f64::from(rounds);
             let before = self.round_ms.unwrap_or(0.0);
@@ -88,19 +95,35 @@ mod tests {
     #[test]
     fn rounds_follow_the_time_they_take() {
         let mut schedule = Schedule::default();
-        assert_eq!(schedule.rounds(8, 30.0), 1);
-        assert_eq!(schedule.rounds(8, f32::INFINITY), 8);
-        schedule.take(1, 10.0);
-        assert_eq!(schedule.rounds(8, 30.0), 3);
-        schedule.take(3, 300.0);
-        assert_eq!(schedule.rounds(8, 30.0), 1);
+        assert_eq!(schedule.rounds(false, 8, 30.0), 1);
+        assert_eq!(schedule.rounds(false, 8, f32::INFINITY), 8);
+        schedule.take(false, 1, 10.0);
+        assert_eq!(schedule.rounds(false, 8, 30.0), 3);
+        schedule.take(false, 3, 300.0);
+        assert_eq!(schedule.rounds(false, 8, 30.0), 1);
         for _ in 0..20 {
-            schedule.take(1, 0.01);
+            schedule.take(false, 1, 0.01);
         }
-        assert_eq!((schedule.rounds(8, 30.0), schedule.rounds(0, 30.0)), (8, 1));
-        schedule.take(0, 1e9);
-        schedule.take(1, f64::NAN);
-        assert_eq!(schedule.rounds(8, 30.0), 8);
-        assert_eq!(schedule.rounds(8, f32::NAN), 1);
+        assert_eq!((schedule.rounds(false, 8, 30.0), schedule.rounds(false, 0, 30.0)), (8, 1));
+        schedule.take(false, 0, 1e9);
+        schedule.take(false, 1, f64::NAN);
+        assert_eq!(schedule.rounds(false, 8, 30.0), 8);
+        assert_eq!(schedule.rounds(false, 8, f32::NAN), 1);
+    }
+
+    #[test]
+    fn first_passes_grow_by_a_round_from_frame_to_frame() {
+        let mut schedule = Schedule::default();
+        schedule.take(true, 1, 0.1);
+        assert_eq!(schedule.rounds(true, 8, 30.0), 2);
+        assert_eq!(schedule.rounds(false, 8, 30.0), 8);
+        assert_eq!(schedule.rounds(true, 8, f32::INFINITY), 8);
+        schedule.take(true, 2, 0.1);
+        schedule.take(false, 1, 0.1);
+        assert_eq!(schedule.rounds(true, 8, 30.0), 3);
+        schedule.take(true, 0, 0.1);
+        assert_eq!(schedule.rounds(true, 8, 30.0), 1);
+        schedule.take(true, u32::MAX, 0.1);
+        assert_eq!(schedule.rounds(true, 8, 30.0), 8);
     }
 }

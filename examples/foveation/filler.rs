@@ -10,8 +10,6 @@ use crate::support::{Failure, Gpu};
 use crate::view::Volume;
 
 const BUDGET_BYTES: u64 = 1 << 30;
-/// More than the rays of a pass need where no sample is missing.
-const ROUNDS: u32 = 4;
 
 /// A way to fill.
 #[derive(Clone, Copy, Debug)]
@@ -111,8 +109,6 @@ impl Filler {
     ) -> Result<(), Failure> {
         let options = FrameOptions {
             shading: published_shading(),
-            rounds_per_pass: ROUNDS,
-            pass_ms: f32::INFINITY,
             infill: self.way.infill,
             foveation,
             ..Default::default()

@@ -1,5 +1,6 @@
 //! Times of full and of foveated frames, nothing missing.
 
+use std::collections::BTreeMap;
 use std::time::Instant;
 
 use progressive_iso::{Foveation, Outputs, RendererOptions, Residency};
@@ -46,6 +47,19 @@ pub struct Speed {
     /// Tracing against 1 / `c_max`.
     pub efficiency: f64,
     pub fills: Vec<Fill>,
+    /// With the feature `wgpu-profiler`: GPU times by stage.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub stages: Vec<Stages>,
+}
+
+/// Medians of the GPU times of one frame's stages.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Stages {
+    /// "full", "traced" or a filler's name.
+    pub frame: String,
+    pub ms: BTreeMap<String, f64>,
+    /// Wall time less all stages.
+    pub rest_ms: f64,
 }
 
 /// The first pass with filling, depth and normals included.
@@ -65,6 +79,7 @@ struct Clocked {
     size: [u32; 2],
     foveated: bool,
     ms: Vec<f64>,
+    stage_ms: BTreeMap<String, Vec<f64>>,
     sampled: f64,
     entered: f64,
 }
@@ -143,7 +158,8 @@ impl Clocked {
         let mut filler = Filler::new(&gpu, volume, way, options)?;
         filler.set_frame(volume.camera(place, 0, size), None)?;
         filler.finish(&gpu)?;
-        Ok(Self { gpu, filler, place, size, foveated, ms: Vec::new(), sampled: 1.0, entered: 0.0 })
+        let (ms, stage_ms) = Default::default();
+        Ok(Self { gpu, filler, place, size, foveated, ms, stage_ms, sampled: 1.0, entered: 0.0 })
     }
 
     /// One frame; the first of a series does not count.
@@ -161,8 +177,31 @@ impl Clocked {
         (self.sampled, self.entered) = (share(report.sampled_rays), share(report.entered_rays));
         if run > 0 {
             self.ms.push(ms);
+            self.note_stages();
         }
         Ok(())
+    }
+
+    /// Full frames have one pass, too, as nothing is missing.
+    fn note_stages(&mut self) {
+        #[cfg(feature = "wgpu-profiler")]
+        {
+            let mut sums = BTreeMap::<String, f64>::new();
+            for stage in self.filler.renderer.stage_times() {
+                *sums.entry(stage.label.clone()).or_default() += stage.ms;
+            }
+            for (label, ms) in sums {
+                self.stage_ms.entry(label).or_default().push(ms);
+            }
+        }
+    }
+
+    fn take_stages(&mut self, frame: &str, wall_ms: f64) -> Option<Stages> {
+        let stages = std::mem::take(&mut self.stage_ms);
+        let ms: BTreeMap<_, _> =
+            stages.into_iter().map(|(label, ms)| (label, median(ms.into_iter()))).collect();
+        let rest_ms = wall_ms - ms.values().sum::<f64>();
+        (!ms.is_empty()).then(|| Stages { frame: frame.to_owned(), ms, rest_ms })
     }
 
     fn take_median(&mut self) -> f64 {
@@ -180,6 +219,11 @@ impl Speed {
     ) -> Self {
         let ms: Vec<f64> = contenders.iter_mut().map(Clocked::take_median).collect();
         let (full_ms, traced_ms) = (ms[0], ms[1]);
+        let stages = contenders.iter_mut().zip(&ms).enumerate().filter_map(|(i, (clocked, &ms))| {
+            let name = ["full", "traced"].get(i).copied();
+            clocked.take_stages(name.unwrap_or(clocked.filler.way.name), ms)
+        });
+        let stages = stages.collect();
         let Clocked { place, size, sampled, entered, .. } = contenders[1];
         let c_max = foveation.mean_density(size);
         let fill = |contender: (&Clocked, &f64)| Fill {
@@ -201,6 +245,7 @@ impl Speed {
             traced_speedup: full_ms / traced_ms,
             efficiency: full_ms / traced_ms * c_max,
             fills: contenders[2..].iter().zip(&ms[2..]).map(fill).collect(),
+            stages,
         }
     }
 

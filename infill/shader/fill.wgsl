@@ -66,6 +66,7 @@ fn fill(pixel: vec2<u32>, number: u32, guesses: vec3<u32>, words: vec2<u32>) -> 
 fn fill_tile(corner: vec2<u32>, listed: bool, lane: u32) {
     decode_tile(corner, lane);
     let strips = conv_strips(INFILL_TILE);
+    var filled = 0u;
     for (var i = lane; i < strips * INFILL_TILE; i += LANES) {
         let inside = vec2<u32>(CONV_STRIP * (i % strips), i / strips);
         var words = decode_strip(inside);
@@ -73,12 +74,11 @@ fn fill_tile(corner: vec2<u32>, listed: bool, lane: u32) {
             let pixel = corner + inside + vec2<u32>(k, 0u);
             let number = frame_number(frame, pixel);
             if (listed && all(pixel < params.size) && infill_is_hole(number)) {
-                if (fill(pixel, number, sources_guesses(pixel), words[k])) {
-                    atomicAdd(&filled_count, 1u);
-                }
+                filled += u32(fill(pixel, number, sources_guesses(pixel), words[k]));
             }
         }
     }
+    atomicAdd(&filled_count, filled);
 }
 #else
 fn fill_tile(corner: vec2<u32>, listed: bool, lane: u32) {
@@ -88,14 +88,14 @@ fn fill_tile(corner: vec2<u32>, listed: bool, lane: u32) {
 #endif
     let share = infill_share(atomicLoad(&tiles[TILES_SHARES]), atomicLoad(&tiles[TILES_SAMPLES]));
     let count = atomicLoad(&holes_count);
+    var filled = 0u;
     for (var i = lane; i < count; i += LANES) {
         let inside = holes_place(i);
         let pixel = corner + inside;
         let number = frame_number(frame, pixel);
-        if (fill(pixel, number, guesses(pixel, number, inside, share), vec2<u32>(0u))) {
-            atomicAdd(&filled_count, 1u);
-        }
+        filled += u32(fill(pixel, number, guesses(pixel, number, inside, share), vec2<u32>(0u)));
     }
+    atomicAdd(&filled_count, filled);
 }
 #endif
 

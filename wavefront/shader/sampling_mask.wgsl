@@ -1,7 +1,7 @@
 // The sampling mask of a pass: a bit for every ray that may be cast, kept from pass to pass of a frame.
 #import frame
 #import indirect
-#import ray_quads
+#import ray_words
 
 struct SamplingParams {
     gaze: vec2<f32>, // in shares of width and height
@@ -20,26 +20,43 @@ struct SamplingParams {
 
 var<workgroup> added: atomic<u32>;
 
-fn tile_rank(pixel: vec2<u32>) -> u32 {
-    let place = pixel.x % TILE_EDGE + TILE_EDGE * (pixel.y % TILE_EDGE);
-    return (tiles[sampling.slice + place / 2u] >> (16u * (place & 1u))) & 0xffffu;
+// What exp(-falloff r^2) is the product of for both axes.
+fn fovea(pixel: vec4<u32>, axis: u32) -> vec4<f32> {
+    let r = (vec4<f32>(pixel) + vec4<f32>(0.5)) * sampling.share_per_pixel[axis] - vec4<f32>(sampling.gaze[axis]);
+    return select(vec4<f32>(0.0), exp(-sampling.falloff * (r * r)), vec4<bool>(sampling.falloff > 0.0));
 }
 
-// Probability that a pass does not draw the pixel.
-fn not_drawn(pixel: vec2<u32>) -> f32 {
-    let r = (vec2<f32>(pixel) + vec2<f32>(0.5)) * sampling.share_per_pixel - sampling.gaze;
-    let fovea = select(0.0, exp(-sampling.falloff * dot(r, r)), sampling.falloff > 0.0);
-    return (1.0 - sampling.base_density) * (1.0 - fovea);
-}
-
-fn is_drawn(pixel: vec2<u32>) -> bool {
-    var left = not_drawn(pixel);
-    if (sampling.draws > 1u) {
-        left = pow(max(left, 1e-30), f32(sampling.draws));
+// Which of four pixels with these ranks the pass draws.
+fn is_drawn(ranks: vec4<u32>, fovea: vec4<f32>) -> vec4<bool> {
+    // Probability that one pass does not draw them.
+    var left = (1.0 - sampling.base_density) * (vec4<f32>(1.0) - fovea);
+    if (sampling.draws > min(1u, ranks.x)) {
+        left = pow(max(left, vec4<f32>(1e-30)), vec4<f32>(f32(sampling.draws)));
     }
     // (rank + 0.5) / TILE_RANKS < 1 - left, without losing digits of a small `left`.
-    let above = f32(TILE_RANKS - tile_rank(pixel)) - 0.5;
-    return sampling.draws == 0u || above > f32(TILE_RANKS) * left;
+    let above = vec4<f32>(vec4<u32>(TILE_RANKS) - ranks) - vec4<f32>(0.5);
+    return (above > f32(TILE_RANKS) * left) | vec4<bool>(sampling.draws == 0u);
+}
+
+// Bits of a word's rays that the pass draws, none of them outside the picture.
+fn draw_word(number: u32, zero: u32) -> u32 {
+    let corner = frame_pixel(frame, number);
+    let rows = vec4<u32>(corner.y) + vec4<u32>(0u, 1u, 2u, 3u);
+    let is_inside = rows < vec4<u32>(frame.height);
+    let row_fovea = fovea(rows, 1u);
+    let row_words = vec4<u32>(sampling.slice) + (TILE_EDGE / 2u) * (rows % vec4<u32>(TILE_EDGE));
+    var bits = 0u;
+    for (var column = 0u; column < WORD_COLUMNS + zero; column += 2u) {
+        let columns = vec2<u32>(corner.x + column) + vec2<u32>(0u, 1u);
+        let column_fovea = fovea(columns.xyxy, 0u);
+        let words = row_words + vec4<u32>(columns.x % TILE_EDGE / 2u);
+        let ranks = vec4<u32>(tiles[words.x], tiles[words.y], tiles[words.z], tiles[words.w]);
+        let even = is_drawn(ranks & vec4<u32>(0xffffu), row_fovea * column_fovea.x);
+        let odd = is_drawn(ranks >> vec4<u32>(16u), row_fovea * column_fovea.y);
+        bits |= word_bits(even & is_inside & vec4<bool>(columns.x < frame.width), column);
+        bits |= word_bits(odd & is_inside & vec4<bool>(columns.y < frame.width), column + 1u);
+    }
+    return bits;
 }
 
 @compute @workgroup_size(64)
@@ -48,31 +65,22 @@ fn main(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    quad_begin(lane);
     if (lane == 0u) {
         atomicStore(&added, 0u);
     }
     workgroupBarrier();
-    let first = (indirect_linear_group(group, groups) * 64u + lane) * QUAD_RAYS;
-    let corner = frame_pixel(frame, first);
-    var bits = 0u;
-    for (var i = 0u; i < QUAD_RAYS; i++) {
-        let pixel = quad_pixel(corner, i);
-        let inside = first < frame.ray_numbers && pixel.x < frame.width && pixel.y < frame.height;
-        bits |= select(0u, 1u << i, inside && is_drawn(pixel));
-    }
-    quad_add(lane, bits);
-    workgroupBarrier();
-    if (quad_leads(lane) && first < frame.ray_numbers) {
-        let before = sampling_mask[first >> 5u];
-        let now = before | quad_word(lane);
-        sampling_mask[first >> 5u] = now;
+    let word = indirect_linear_group(group, groups) * 64u + lane;
+    if (word * WORD_RAYS < frame.ray_numbers) {
+        let before = sampling_mask[word];
+        let zero = frame_zero(atomicLoad(&rays[RAYS_HITS]));
+        let now = before | draw_word(word * WORD_RAYS, zero);
+        sampling_mask[word] = now;
         atomicAdd(&added, countOneBits(now ^ before));
     }
     workgroupBarrier();
     if (lane == 0u) {
         atomicAdd(&rays[RAYS_SAMPLED], atomicLoad(&added));
-        if (first == 0u) {
+        if (word == 0u) {
             atomicStore(&rays[RAYS_MASKED], 1u);
             atomicStore(&rays[RAYS_LISTED], 1u); // the list is to be made again
         }

@@ -4,7 +4,7 @@
 #import indirect
 #import macrocell_skip
 #import outputs
-#import ray_quads
+#import ray_words
 
 @group(0) @binding(0) var<uniform> frame: FrameParams;
 @group(0) @binding(1) var<uniform> shading: ShadingParams;
@@ -21,15 +21,17 @@
 @group(0) @binding(STATUS_BINDING) var status_out: texture_storage_2d<r32uint, write>;
 #endif
 
-// Pixels on the edge of a workgroup's tile, unless the picture is tiny.
+// A tile of pixels: those of eight words that follow each other, unless the picture is tiny.
 const TILE: u32 = 16u;
+const TILE_WORDS: u32 = 8u;
 
 // Voxels inside a box: rays that are rounded differently from one another are not as far apart. A crossing's error is below
 // 2^-4 voxels while rays that meet the volume start within 2^16 voxels of it: eight roundings of 2^-24.
 const MARGIN: i32 = 1;
 
 var<workgroup> entered: atomic<u32>;
-var<workgroup> corners_inside: atomic<u32>;
+// For the corners of a workgroup's tiles, four of each, whether their rays meet what is inside the box.
+var<workgroup> corners_inside: array<u32, 32>;
 
 fn macrocell_mask(index: u32) -> vec2<u32> {
     return masks[index];
@@ -40,15 +42,21 @@ fn meets(ray: DdaRay, box: DdaBox) -> bool {
     return all(box.low <= box.high) && dda_meets(ray, box);
 }
 
-// Whether the rays in all four corners of the workgroup's tile, one for each of the first lanes, meet what is inside the
-// box: then all of its rays meet the box, since what a convex body covers of a picture is convex.
-fn count_corner(corner: vec2<u32>, box: DdaBox, lane: u32) {
-    let pixel = corner + (TILE - 1u) * vec2<u32>(lane & 1u, lane >> 1u);
-    let is_tile = frame.ray_level > 0u && pixel.x < frame.width && pixel.y < frame.height;
+// Whether the ray in a corner of a tile meets what is inside the box.
+fn corner_inside(first_pixel: vec2<u32>, corner: u32, box: DdaBox) -> bool {
+    let pixel = first_pixel + (TILE - 1u) * vec2<u32>(corner & 1u, corner >> 1u);
+    // `&`, since lavapipe compiles a kernel anew in every frame if a uniform alone decides a branch.
+    let is_tile = (frame.ray_level > 0u) & (pixel.x < frame.width) & (pixel.y < frame.height);
     let inside = DdaBox(box.low + vec3<i32>(MARGIN), box.high - vec3<i32>(MARGIN));
-    if (is_tile && meets(frame_ray(frame, pixel).ray, inside)) {
-        atomicAdd(&corners_inside, 1u);
-    }
+    return is_tile && meets(frame_ray(frame, pixel).ray, inside);
+}
+
+// Whether the rays in all four corners of a word's tile meet what is inside the box: then all of its rays meet the box,
+// since what a convex body covers of a picture is convex.
+fn tile_inside(lane: u32) -> bool {
+    let first = lane / TILE_WORDS * 4u;
+    return (corners_inside[first] & corners_inside[first + 1u] & corners_inside[first + 2u]
+        & corners_inside[first + 3u]) != 0u;
 }
 
 // Starts a ray: (enters the volume, may hit something), 1 for yes.
@@ -71,52 +79,52 @@ fn write_header(box: DdaBox) {
     }
 }
 
+// Starts the rays of a word: (how many enter the volume, bits of those that may hit something).
+fn start_word(number: u32, box: DdaBox, zero: u32) -> vec2<u32> {
+    let volume = DdaBox(vec3<i32>(0), frame.grid.last_cell + vec3<i32>(i32(zero)));
+    let corner = frame_pixel(frame, number);
+    var counts = vec2<u32>(0u);
+    for (var i = 0u; i < WORD_RAYS + zero; i++) {
+        let pixel = word_pixel(corner, i);
+        if (pixel.x < frame.width && pixel.y < frame.height) {
+            let started = start(pixel, volume, box);
+            counts += vec2<u32>(started.x, started.y << i);
+        }
+    }
+    return counts;
+}
+
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    quad_begin(lane);
-    if (lane == 0u) {
-        atomicStore(&entered, 0u);
-        atomicStore(&corners_inside, 0u);
-    }
-    workgroupBarrier();
-    let number = indirect_linear_group(group, groups) * 64u * QUAD_RAYS;
+    let first_word = indirect_linear_group(group, groups) * 64u;
     let zero = frame_zero(atomicLoad(&rays[RAYS_HITS]));
     let grid = macrocell_active(frame.grid);
     let box = DdaBox(4 * grid.first_block, grid.last_cell);
-    if (lane < 4u) {
-        count_corner(frame_pixel(frame, number), box, lane);
+    if (lane == 0u) {
+        atomicStore(&entered, 0u);
+    }
+    if (lane < 32u) {
+        let first_pixel = frame_pixel(frame, (first_word + lane / 4u * TILE_WORDS) * WORD_RAYS);
+        corners_inside[lane] = u32(corner_inside(first_pixel, lane & 3u, box));
     }
     workgroupBarrier();
-    let first = number + lane * QUAD_RAYS;
-    if (first < frame.ray_numbers) {
-        // Entering the volume, and their bits.
-        var counts = vec2<u32>(QUAD_RAYS, (1u << QUAD_RAYS) - 1u);
-        if (atomicLoad(&corners_inside) < 4u) {
-            let volume = DdaBox(vec3<i32>(0), frame.grid.last_cell + vec3<i32>(i32(zero)));
-            let corner = frame_pixel(frame, first);
-            counts = vec2<u32>(0u);
-            for (var i = 0u; i < QUAD_RAYS + zero; i++) {
-                let pixel = quad_pixel(corner, i);
-                if (pixel.x < frame.width && pixel.y < frame.height) {
-                    let started = start(pixel, volume, box);
-                    counts += vec2<u32>(started.x, started.y << i);
-                }
-            }
+    let number = (first_word + lane) * WORD_RAYS;
+    if (number < frame.ray_numbers) {
+        var counts = vec2<u32>(WORD_RAYS, 0xffffffffu);
+        if (!tile_inside(lane)) {
+            counts = start_word(number, box, zero);
         }
-        quad_add(lane, counts.y);
+        atomicStore(&rays[frame_active_word(frame, number)], counts.y);
         atomicAdd(&entered, counts.x);
     }
     workgroupBarrier();
-    if (quad_leads(lane) && first < frame.ray_numbers) {
-        atomicStore(&rays[frame_active_word(frame, first)], quad_word(lane));
-    }
     if (lane == 0u) {
         atomicAdd(&rays[RAYS_ENTERED], atomicLoad(&entered));
-        if (first == 0u) {
+        if (first_word == 0u) {
             write_header(box);
         }
     }

@@ -25,8 +25,8 @@ const BLOCK_WALK: Module =
     Module { name: "block_walk", source: include_str!("../shader/lib/block_walk.wgsl") };
 pub(crate) const FIRST_BLOCK: Module =
     Module { name: "first_block", source: include_str!("../shader/lib/first_block.wgsl") };
-const RAY_QUADS: Module =
-    Module { name: "ray_quads", source: include_str!("../shader/lib/ray_quads.wgsl") };
+const RAY_WORDS: Module =
+    Module { name: "ray_words", source: include_str!("../shader/lib/ray_words.wgsl") };
 const WORK: Module = Module { name: "work", source: include_str!("../shader/lib/work.wgsl") };
 const LIST: Module = Module { name: "list", source: include_str!("../shader/list.wgsl") };
 pub(crate) const BLOCK_NEED: Module =
@@ -37,8 +37,8 @@ pub(crate) const BLOCK_REQUEST: Module =
 const START: Module = Module { name: "start", source: include_str!("../shader/start.wgsl") };
 const RESOLVE: Module = Module { name: "resolve", source: include_str!("../shader/resolve.wgsl") };
 
-/// Rays of one workgroup of `shader/lib/ray_quads.wgsl`.
-const RAYS_PER_QUAD_GROUP: u32 = 256;
+/// Rays of one workgroup of `shader/lib/ray_words.wgsl`.
+const RAYS_PER_WORD_GROUP: u32 = 64 * 32;
 
 /// Binding of the rays' header and states.
 pub(crate) const RAYS: Binding = Binding::StorageReadWrite { min_bytes: 4 * RAYS_HEADER_WORDS + 4 };
@@ -115,7 +115,7 @@ pub(crate) fn library(samples: SampleLayout) -> Vec<Module> {
         BLOCK_REQUEST,
         BLOCK_WALK,
         FIRST_BLOCK,
-        RAY_QUADS,
+        RAY_WORDS,
         WORK,
         samples.module(),
         OUTPUTS,
@@ -219,7 +219,7 @@ impl Rays {
         textures.record_unfinished(encoder, shading.unfinished);
         {
             let mut pass = begin(encoder, "wavefront.start");
-            let groups = buffers.plan.numbers().div_ceil(u64::from(RAYS_PER_QUAD_GROUP));
+            let groups = buffers.plan.numbers().div_ceil(u64::from(RAYS_PER_WORD_GROUP));
             self.start.dispatch(&mut pass, &buffers.start, groups);
         }
         if let (Some(sampling), Some(foveation)) = (sampling, &buffers.foveation) {
@@ -243,7 +243,7 @@ impl Rays {
         if let (Some(kernel), Some(foveation)) = (&self.sampling_mask, &buffers.foveation) {
             upload.write(device, encoder, &foveation.params, 0, bytemuck::bytes_of(sampling));
             let mut pass = begin(encoder, "wavefront.sampling_mask");
-            let groups = buffers.plan.numbers().div_ceil(u64::from(RAYS_PER_QUAD_GROUP));
+            let groups = buffers.plan.numbers().div_ceil(u64::from(RAYS_PER_WORD_GROUP));
             kernel.dispatch(&mut pass, &foveation.bind, groups);
             self.record_list(&mut pass, buffers);
         }
