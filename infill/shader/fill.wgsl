@@ -82,15 +82,14 @@ fn fill_tile(corner: vec2<u32>, listed: bool, lane: u32) {
 }
 #else
 fn fill_tile(corner: vec2<u32>, listed: bool, lane: u32) {
-    holes_collect(corner, listed, lane);
+    let count = holes_collect(corner, listed, lane);
 #ifdef NEIGHBOURS
     pull_tile(corner, lane);
 #endif
     let share = infill_share(atomicLoad(&tiles[TILES_SHARES]), atomicLoad(&tiles[TILES_SAMPLES]));
-    let count = atomicLoad(&holes_count);
     var filled = 0u;
     for (var i = lane; i < count; i += LANES) {
-        let inside = holes_place(i);
+        let inside = holes_place(i, count);
         let pixel = corner + inside;
         let number = frame_number(frame, pixel);
         filled += u32(fill(pixel, number, guesses(pixel, number, inside, share), vec2<u32>(0u)));

@@ -24,14 +24,13 @@ fn main(
     let index = indirect_linear_group(group, groups);
     let listed = index < tiles[LIST];
     let corner = infill_tile_corner(params, tiles[infill_list_word(params, LIST, select(0u, index, listed))]);
-    holes_collect(corner, listed, lane);
+    let count = holes_collect(corner, listed, lane);
 #ifdef NEIGHBOURS
     pull_tile(corner, lane);
 #endif
     let share = infill_share(tiles[TILES_SHARES], tiles[TILES_SAMPLES]);
-    let count = atomicLoad(&holes_count);
     for (var i = lane; i < count; i += 64u) {
-        let inside = holes_place(i);
+        let inside = holes_place(i, count);
         let pixel = corner + inside;
         let words = guesses(pixel, frame_number(frame, pixel), inside, share);
         let first = 3u * infill_pixel_index(params, pixel);

@@ -1,7 +1,7 @@
 // Averages of the finished pixels, from 2x2 pixels to 16x16. A workgroup for every tile with holes and its
 // neighbours, an invocation for 2x2 pixels.
 #import infill_params
-#import infill_rays
+#import tile_rays
 #import average
 #import indirect
 
@@ -15,10 +15,22 @@
 
 const LIST: u32 = 1u;
 
-var<workgroup> texels: array<Average, 64>;
+// Two vectors of each: a load costs some drivers as much for four numbers as for one.
+var<workgroup> texels: array<vec4<f32>, 128>;
 
+fn texel(index: u32) -> Average {
+    let scalars = texels[2u * index];
+    return Average(scalars.x, scalars.y, texels[2u * index + 1u].xyz, scalars.z);
+}
+
+fn keep_texel(index: u32, value: Average) {
+    texels[2u * index] = vec4<f32>(value.weight, value.coverage, value.t, 0.0);
+    texels[2u * index + 1u] = vec4<f32>(value.normal, 0.0);
+}
+
+// Of a finished pixel.
 fn pixel_average(pixel: vec2<u32>) -> Average {
-    if (any(pixel >= params.size) || infill_is_hole(frame_number(frame, pixel))) {
+    if (any(pixel >= params.size)) {
         return average_none();
     }
     let normal = textureLoad(normals, pixel, 0).xyz;
@@ -45,35 +57,35 @@ fn main(
     let index = indirect_linear_group(group, groups);
     let listed = index < tiles[LIST];
     let corner = infill_tile_corner(params, tiles[infill_list_word(params, LIST, select(0u, index, listed))]);
-    let own = vec2<u32>(lane & 7u, lane >> 3u);
+    let own = tile_place(lane);
+    let holes = tile_word(corner, lane >> 3u) >> (4u * (lane & 7u));
     var sum = average_none();
     for (var child = 0u; child < 4u; child++) {
-        let pixel = corner + 2u * own + vec2<u32>(child & 1u, child >> 1u);
-        sum = average_plus(sum, pixel_average(pixel), 1.0);
+        if (((holes >> child) & 1u) == 0u) {
+            sum = average_plus(sum, pixel_average(corner + 2u * own + tile_place(child)), 1.0);
+        }
     }
     let first = average_limited(sum);
-    texels[lane] = first;
+    keep_texel(lane, first);
     if (listed) {
         write(0u, corner / 2u + own, first);
     }
-    // 8x8 texels become 4x4, 2x2, 1.
+    // 8x8 texels become 4x4, 2x2, 1, each of four that follow each other.
     for (var level = 1u; level < 4u; level++) {
         workgroupBarrier();
-        let edge = 8u >> level;
-        let place = vec2<u32>(lane % edge, lane / edge);
+        let is_texel = (lane << (2u * level)) < 64u;
         var next = average_none();
-        if (lane < edge * edge) {
+        if (is_texel) {
             for (var child = 0u; child < 4u; child++) {
-                let source = 2u * place + vec2<u32>(child & 1u, child >> 1u);
-                next = average_plus(next, texels[source.x + 2u * edge * source.y], 1.0);
+                next = average_plus(next, texel(4u * lane + child), 1.0);
             }
             next = average_limited(next);
         }
         workgroupBarrier();
-        if (lane < edge * edge) {
-            texels[lane] = next;
+        if (is_texel) {
+            keep_texel(lane, next);
             if (listed) {
-                write(level, (corner >> vec2<u32>(level + 1u)) + place, next);
+                write(level, (corner >> vec2<u32>(level + 1u)) + own, next);
             }
         }
     }

@@ -18,7 +18,7 @@ macro_rules! modules {
 }
 
 /// What kernels of this crate import from it.
-const LIBRARY: [Module; 14] = modules![
+const LIBRARY: [Module; 15] = modules![
     infill_params = "infill_params.wgsl",
     infill_rays = "infill_rays.wgsl",
     candidate = "candidate.wgsl",
@@ -27,6 +27,7 @@ const LIBRARY: [Module; 14] = modules![
     coarse_field = "coarse_field.wgsl",
     march = "march.wgsl",
     guesses = "guesses.wgsl",
+    tile_rays = "tile_rays.wgsl",
     holes = "holes.wgsl",
     history = "history.wgsl",
     sources = "sources.wgsl",

@@ -99,8 +99,11 @@ fn main(
         part += sums[i] >> 16u;
         active_part += sums[i] & 0xffffu;
     }
-    let active_count = scan_group(lane, active_part).total;
     let summed = scan_group(lane, part).total;
+    var active_count = 0u;
+    if (group == 0u) {
+        active_count = scan_group(lane, active_part).total;
+    }
 #else
     for (var i = lane; i < end; i += SCAN_LANES) {
         part += sums[i];

@@ -1,28 +1,42 @@
 // A tile's holes, one after the other, so that no lane is without one while others work. The importing text declares
 // `frame`, `params` and `rays`.
 #import infill_params
-#import infill_rays
+#import tile_rays
 
-var<workgroup> holes_inside: array<u32, INFILL_TILE * INFILL_TILE>;
-var<workgroup> holes_count: atomic<u32>;
+var<workgroup> holes_inside: array<u32, INFILL_TILE_RAYS>;
+var<workgroup> holes_words: array<u32, INFILL_TILE_WORDS>;
 
-// Collects them, none unless the tile is `listed`. All 64 invocations call it together.
-fn holes_collect(corner: vec2<u32>, listed: bool, lane: u32) {
-    if (lane == 0u) {
-        atomicStore(&holes_count, 0u);
+// Collects them, none unless the tile is `listed`; their number. All 64 invocations call it together.
+fn holes_collect(corner: vec2<u32>, listed: bool, lane: u32) -> u32 {
+    if (lane < INFILL_TILE_WORDS) {
+        holes_words[lane] = select(0u, tile_word(corner, lane), listed);
     }
     workgroupBarrier();
-    for (var i = lane; i < INFILL_TILE * INFILL_TILE; i += 64u) {
-        let pixel = corner + vec2<u32>(i % INFILL_TILE, i / INFILL_TILE);
-        if (listed && all(pixel < params.size) && infill_is_hole(frame_number(frame, pixel))) {
-            holes_inside[atomicAdd(&holes_count, 1u)] = i;
+    // An invocation looks at four of the rays.
+    let shift = 4u * (lane & 7u);
+    let word = holes_words[lane >> 3u];
+    var count = 0u;
+    var before = countOneBits(word & ((1u << shift) - 1u));
+    for (var i = 0u; i < INFILL_TILE_WORDS; i++) {
+        before += select(0u, countOneBits(holes_words[i]), i < (lane >> 3u));
+        count += countOneBits(holes_words[i]);
+    }
+    if (count < INFILL_TILE_RAYS) {
+        for (var i = 0u; i < 4u; i++) {
+            if (((word >> (shift + i)) & 1u) != 0u) {
+                holes_inside[before] = 4u * lane + i;
+                before++;
+            }
         }
     }
     workgroupBarrier();
+    return count;
 }
 
-// The place of a hole in its tile.
-fn holes_place(index: u32) -> vec2<u32> {
-    let i = holes_inside[index];
-    return vec2<u32>(i % INFILL_TILE, i / INFILL_TILE);
+// The place in its tile of one of `count` holes.
+fn holes_place(index: u32, count: u32) -> vec2<u32> {
+    if (count == INFILL_TILE_RAYS) {
+        return tile_place(index);
+    }
+    return tile_place(holes_inside[index]);
 }

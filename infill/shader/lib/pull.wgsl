@@ -7,18 +7,8 @@
 // A level's texels in a tile and one more on every side: 10x10, 6x6, 4x4, 3x3.
 const PULL_TEXELS: u32 = 161u;
 
-// Two vectors of each: a load costs some drivers as much for four numbers as for one.
-var<workgroup> pull_texels: array<vec4<f32>, 2u * PULL_TEXELS>;
-
-fn pull_held(index: u32) -> Average {
-    let scalars = pull_texels[2u * index];
-    return Average(scalars.x, scalars.y, pull_texels[2u * index + 1u].xyz, scalars.z);
-}
-
-fn pull_hold(index: u32, value: Average) {
-    pull_texels[2u * index] = vec4<f32>(value.weight, value.coverage, value.t, 0.0);
-    pull_texels[2u * index + 1u] = vec4<f32>(value.normal, 0.0);
-}
+// As halves: a load costs some drivers as much for one number as for four.
+var<workgroup> pull_texels: array<vec4<u32>, PULL_TEXELS>;
 
 fn pull_edge(level: u32) -> u32 {
     return (8u >> level) + 2u;
@@ -44,10 +34,10 @@ fn pull_interpolated(level: u32, finer: vec2<i32>) -> Average {
     // The first texel held is the one before the tile.
     let first = pull_first(level) + u32(upper.x) + edge * u32(upper.y);
     var sum = average_none();
-    sum = average_plus(sum, pull_held(first), (1.0 - share.x) * (1.0 - share.y));
-    sum = average_plus(sum, pull_held(first + 1u), share.x * (1.0 - share.y));
-    sum = average_plus(sum, pull_held(first + edge), (1.0 - share.x) * share.y);
-    return average_plus(sum, pull_held(first + edge + 1u), share.x * share.y);
+    sum = average_plus(sum, average_unpack(pull_texels[first]), (1.0 - share.x) * (1.0 - share.y));
+    sum = average_plus(sum, average_unpack(pull_texels[first + 1u]), share.x * (1.0 - share.y));
+    sum = average_plus(sum, average_unpack(pull_texels[first + edge]), (1.0 - share.x) * share.y);
+    return average_plus(sum, average_unpack(pull_texels[first + edge + 1u]), share.x * share.y);
 }
 
 // Fills the workgroup's memory for a tile. All 64 invocations call it together.
@@ -68,7 +58,7 @@ fn pull_tile(corner: vec2<u32>, lane: u32) {
                 let inside = clamped - vec2<i32>(corner >> vec2<u32>(level + 1u));
                 value = average_plus(value, pull_interpolated(level + 1u, inside), 1.0 - value.weight);
             }
-            pull_hold(pull_first(level) + i, value);
+            pull_texels[pull_first(level) + i] = average_pack(value);
         }
         workgroupBarrier();
     }
