@@ -1,4 +1,5 @@
-//! The frame-time budget: how many rays a frame's first pass casts, so that it takes no longer than it should.
+//! The frame-time budget: how many rays a frame's first pass casts, and how far it looks ahead, so that it takes no longer
+//! than it should.
 //!
 //! A frame's time is predicted as its work, which a pre-pass estimates, times a cost per unit of work, which is learned
 //! while frames are rendered (V. Bruder, S. Frey, T. Ertl, Real-Time Performance Prediction and Tuning for Interactive
@@ -48,6 +49,8 @@ const CAUTION: f64 = 0.5;
 const FIRST_SPREAD: f64 = 0.05;
 const MOST_ERROR: f64 = 0.5;
 const SPREAD_RATE: f64 = 0.1;
+/// As many of these are kept free below a target.
+const SPREADS: f64 = 1.5;
 /// Part of a time that is clearly less.
 const CLEARLY_LESS: f64 = 0.9;
 /// Densities between the most and the least that are looked at.
@@ -58,6 +61,8 @@ const MOST_UNUSABLE: u32 = 3;
 const START_WORK: f64 = 0.1;
 const FILL_WORK: f64 = 4.0;
 const DECODE_WORK: f64 = 2000.0;
+/// Part of what is decoded that a doubled look-ahead adds, before anything was learned.
+const LOOK_AHEAD_WORK: f64 = 0.25;
 
 /// A frame that a setting is wanted for.
 #[derive(Clone, Copy, Debug)]
@@ -77,8 +82,9 @@ pub(crate) struct Choice {
     features: [f64; FEATURES],
     /// 0 without a pre-pass.
     work: f64,
-    /// Share of the rays that the frame's first pass may cast.
+    /// Share of the rays that the frame's first pass may cast, and how far it looks ahead.
     pub(crate) density: f64,
+    pub(crate) look_ahead: u32,
     pub(crate) predicted_ms: Option<f64>,
     pub(crate) target_ms: f64,
     /// CPU time of pre-pass and prediction and of learning from the frame before.
@@ -188,13 +194,21 @@ impl Budget {
         let begin = Instant::now();
         let Request { view, size, isovalue, target_ms, .. } = *request;
         let work = self.pre_pass.as_mut().map(|pre_pass| pre_pass.estimate(view, size, isovalue));
-        let outlook = work.map(|work| Outlook::new(request, &work, self.cached));
-        let density = match (self.mode, &outlook) {
+        let mut outlook = work.map(|work| Outlook::new(request, &work, self.cached));
+        let mut look_ahead = request.look_ahead;
+        let density = match (self.mode, &mut outlook) {
             _ if self.unusable >= MOST_UNUSABLE => 1.0,
             (BudgetMode::Fixed, _) => 1.0,
             (BudgetMode::TwoPass, _) => (self.after_last(target_ms) / 4.0).max(LEAST_DENSITY),
             (BudgetMode::Predicted, Some(outlook)) if self.level.is_some() => {
-                self.fitting(outlook, target_ms)
+                let mut density = self.fitting(outlook, target_ms);
+                // What too few rays do not make room for may be what is decoded for later.
+                if self.cached && look_ahead > 1 && self.cautious_ms(outlook, density) > target_ms {
+                    look_ahead = 1;
+                    *outlook = outlook.with_look_ahead(1);
+                    density = self.fitting(outlook, target_ms);
+                }
+                density
             }
             _ => self.after_last(target_ms),
         };
@@ -205,7 +219,7 @@ impl Budget {
             predicted_ms = self.predict(outlook, density).map(|(ms, _)| ms);
         }
         let cpu_ms = begin.elapsed().as_secs_f64() * 1e3 + self.learning_ms;
-        Choice { features, work: units, density, predicted_ms, target_ms, cpu_ms }
+        Choice { features, work: units, density, look_ahead, predicted_ms, target_ms, cpu_ms }
     }
 
     /// The sampling mask of a frame from its second pass on: that of its first one, or with [`BudgetMode::TwoPass`]
@@ -252,19 +266,12 @@ impl Budget {
     /// the frame before's, or half of that one: what is not known may be better. Fewer rays leave more pixels to fill, so
     /// time need not fall with them; from the least density on, the way is up again.
     fn fitting(&self, outlook: &Outlook, target_ms: f64) -> f64 {
-        let cautious_ms = |density: f64| {
-            let prediction = self.predict(outlook, density);
-            // So that about one in twenty of times that scatter like this lies above.
-            let spread = (2.0 * self.spread).exp();
-            prediction
-                .map_or(f64::INFINITY, |(ms, novelty)| ms * (1.0 + CAUTION * novelty) * spread)
-        };
         let most = (self.density / MOST_STEP).clamp(LEAST_DENSITY, 1.0);
         let (mut best, mut least_ms) = (LEAST_DENSITY, f64::INFINITY);
         for i in 0..=CANDIDATES {
             let share = f64::from(i) / f64::from(CANDIDATES);
             let density = (most * (LEAST_DENSITY / most).powf(share)).max(LEAST_DENSITY);
-            let ms = cautious_ms(density);
+            let ms = self.cautious_ms(outlook, density);
             if ms <= target_ms {
                 return density;
             }
@@ -273,11 +280,19 @@ impl Budget {
             }
         }
         let at_least = self.density <= LEAST_DENSITY;
-        if at_least || least_ms < CLEARLY_LESS * cautious_ms(self.density) {
+        if at_least || least_ms < CLEARLY_LESS * self.cautious_ms(outlook, self.density) {
             best
         } else {
             (0.5 * self.density).max(LEAST_DENSITY)
         }
+    }
+
+    /// More than most times that are predicted like this: about one in nine of those that scatter as the newest did
+    /// lies above.
+    fn cautious_ms(&self, outlook: &Outlook, density: f64) -> f64 {
+        let spread = (SPREADS * self.spread).exp();
+        self.predict(outlook, density)
+            .map_or(f64::INFINITY, |(ms, novelty)| ms * (1.0 + CAUTION * novelty) * spread)
     }
 
     /// Milliseconds, and how new this is.
@@ -297,6 +312,7 @@ struct Outlook {
     cast: f64,
     filled: f64,
     decoded: f64,
+    look_ahead: u32,
     /// With a density of 1.
     features: [f64; FEATURES],
 }
@@ -316,13 +332,14 @@ impl Outlook {
             cast: rays * work.entered * (1.0 + work.visited),
             filled: if fills { rays * work.entered * FILL_WORK } else { 0.0 },
             decoded: fresh * work.in_sight * DECODE_WORK,
+            look_ahead,
             features: [
                 0.0,
                 (1.0 + work.visited).ln(),
                 work.entered,
                 0.5 * (1.0 + work.depth_voxels).ln(),
                 2.0 * fresh,
-                0.3 * f64::from(look_ahead.max(1)).ln(),
+                look_ahead_feature(look_ahead),
                 0.3 * voxels_per_pixel.ln(),
                 0.5 * rays.ln(),
                 0.4 * direction[0],
@@ -331,10 +348,17 @@ impl Outlook {
         }
     }
 
+    fn with_look_ahead(self, look_ahead: u32) -> Self {
+        let mut features = self.features;
+        features[LOOK_AHEAD_FEATURE] = look_ahead_feature(look_ahead);
+        Self { look_ahead, features, ..self }
+    }
+
     /// Work in visits of a block.
     fn units(&self, density: f64) -> f64 {
         let rays = self.started + density * self.cast + (1.0 - density) * self.filled;
-        rays + self.decoded * density.sqrt()
+        let ahead = 1.0 + LOOK_AHEAD_WORK * f64::from(self.look_ahead.max(1)).log2();
+        rays + self.decoded * ahead * density.sqrt()
     }
 
     fn features(&self, density: f64) -> [f64; FEATURES] {
@@ -342,6 +366,13 @@ impl Outlook {
         features[0] = 0.7 * density.ln();
         features
     }
+}
+
+/// Where the look-ahead is among the features.
+const LOOK_AHEAD_FEATURE: usize = 5;
+
+fn look_ahead_feature(look_ahead: u32) -> f64 {
+    0.3 * f64::from(look_ahead.max(1)).ln()
 }
 
 /// Bytes of all coarse cells' ranges.
@@ -415,6 +446,31 @@ mod tests {
         for (i, (density, ms)) in shown.iter().enumerate().skip(20) {
             assert!((22.0..31.0).contains(ms), "frame {i}: {ms} ms with a density of {density}");
         }
+    }
+
+    #[test]
+    fn a_frame_that_decodes_too_much_does_not_look_ahead() {
+        let mut budget = budget(BudgetMode::Predicted);
+        budget.cached = true;
+        // Decoding what is new takes a millisecond for every step of looking ahead; the rest nothing of note.
+        let mut look = |azimuth: f64, target_ms: f64| {
+            let view = view(azimuth, 1.0);
+            let request = Request {
+                view: &view,
+                size: SIZE,
+                isovalue: 0.5,
+                look_ahead: 4,
+                fills: false,
+                target_ms,
+            };
+            let choice = budget.choose(&request);
+            budget.learn(&choice, 10.0 + f64::from(choice.look_ahead));
+            choice.look_ahead
+        };
+        assert_eq!(look(0.0, 1e-3), 4, "nothing is known yet");
+        assert_eq!(look(1.0, 1e6), 4);
+        assert_eq!(look(2.0, 1e-3), 1);
+        assert_eq!(look(3.0, 1e6), 4);
     }
 
     #[test]

@@ -63,6 +63,7 @@ pub(crate) struct PassInfo {
     pub(crate) foveated: bool,
     /// What its setting was chosen by.
     pub(crate) choice: Option<Choice>,
+    pub(crate) look_ahead: u32,
     /// Cells that its walks may visit each, and the time that the pass should take.
     pub(crate) most_cells: u32,
     pub(crate) pass_ms: f32,
@@ -282,6 +283,7 @@ impl PassRecords {
         report.dispatches = info.dispatches;
         report.cpu_ms = info.cpu_ms;
         report.gpu_ms = gpu_ms;
+        report.look_ahead = info.look_ahead;
         report.density = info.choice.map_or(1.0, |choice| choice.density as f32);
         report.predicted_ms = info.choice.and_then(|choice| choice.predicted_ms);
         report.budget_ms = info.choice.map_or(0.0, |choice| choice.cpu_ms);

@@ -1,6 +1,7 @@
 //! The renderer: schedule and state.
 
 mod change;
+mod frame_state;
 #[cfg(test)]
 mod slots_tests;
 
@@ -8,10 +9,12 @@ use gpu_primitives::kernel::dispatches_recorded;
 use gpu_primitives::memory::{Category, Ledger};
 use gpu_primitives::upload::UploadRing;
 use infill::Method;
-use wavefront::{Foveation, FrameView, LookAhead, OutputTextures, SamplingParams, ShadingParams};
+use wavefront::{FrameView, OutputTextures, ShadingParams};
 use web_time::Instant;
 
-use crate::budget::{Choice, Request};
+use frame_state::FrameState;
+
+use crate::budget::Request;
 use crate::capture::PendingCapture;
 use crate::faults::{Faults, Scopes, Task, is_lost};
 use crate::load::{LoadStages, Loader};
@@ -69,41 +72,6 @@ enum Phase {
     Loaded(Option<SampleBuffers>),
     /// Rays are at work.
     Rendering(Box<Rendering>),
-}
-
-#[derive(Debug)]
-struct FrameState {
-    frame: Frame,
-    view: FrameView,
-    number: u64,
-    /// Whether the pictures show nothing of earlier frames.
-    cleared: bool,
-    started: bool,
-    /// Whether its start forgets what is decoded.
-    clears_cache: bool,
-    /// Cells that a walk may visit.
-    most_cells: u32,
-    passes: u32,
-    rounds: u32,
-    /// Which rays its passes may cast, once it has started; `None`: all.
-    foveation: Option<Foveation>,
-    /// What its setting was chosen by, if it is held to a time.
-    choice: Option<Choice>,
-}
-
-impl FrameState {
-    /// What the next pass adds to the sampling mask of a foveated frame, if anything.
-    fn sampling(&self, size: [u32; 2]) -> Option<SamplingParams> {
-        let foveation = self.foveation?;
-        let adds = self.passes < foveation.passes;
-        adds.then(|| SamplingParams::new(&foveation, size, self.number, self.passes))
-    }
-
-    /// Lists of rays made before the first rounds of the passes after the first, so far.
-    fn lists_between(&self) -> u32 {
-        let passes = self.foveation.map_or(1, |foveation| foveation.passes);
-        self.passes.clamp(1, passes) - 1
-    }
 }
 
 impl ProgressiveIsoRenderer {
@@ -182,6 +150,7 @@ impl ProgressiveIsoRenderer {
             started: false,
             clears_cache: false,
             most_cells: 0,
+            first_misses: 0,
             passes: 0,
             rounds: 0,
             foveation: None,
@@ -387,6 +356,10 @@ impl ProgressiveIsoRenderer {
             rendering.record_mask(device, encoder, upload, stages, &sampling);
         }
         state.passes += 1;
+        if state.passes == 2 && state.choice.is_some() {
+            // From now on the frame looks as far ahead as it is asked to.
+            rendering.record_params(device, encoder, &mut self.upload, &state.params(&self.plan));
+        }
         let options = &state.frame.options;
         let pass_ms = options.pass_ms.min(options.target_ms.unwrap_or(f32::INFINITY));
         let first = state.passes == 1;
@@ -423,14 +396,11 @@ impl ProgressiveIsoRenderer {
             stages.activate.record(device, encoder, upload, ranges, masks, isovalue);
             self.active_isovalue = Some(isovalue);
         }
-        let (grid, lru) = (self.plan.macrocell.grid(), self.plan.samples.params());
-        let look_ahead = LookAhead {
-            blocks: frame.options.look_ahead,
-            first_misses: if warm { WARM_MISSES } else { 0 },
-        };
         state.most_cells = self.records.schedule.most_cells();
-        let params =
-            state.view.params(grid, lru, isovalue, look_ahead).with_most_cells(state.most_cells);
+        state.first_misses = if warm { WARM_MISSES } else { 0 };
+        Self::choose_rays(&mut self.records, &self.options, state, clear);
+        let frame = &state.frame;
+        let params = state.params(&self.plan);
         let shading = ShadingParams::new(&frame.options.shading, self.volume.world_from_index);
         let next = (&state.view, &params);
         if frame.options.infill != Infill::Off || frame.options.guided {
@@ -442,7 +412,6 @@ impl ProgressiveIsoRenderer {
             rendering.record_infill_start(device, encoder, upload, stages, next, follows, look);
         }
         self.shown_isovalue = Some(isovalue);
-        Self::choose_rays(&mut self.records, &self.options, state, clear);
         let sampling = state.sampling(self.options.size);
         let sampling = sampling.as_ref();
         let (textures, view) = (&self.pictures.textures, (&params, &shading));
@@ -501,6 +470,7 @@ impl ProgressiveIsoRenderer {
         let lists_at_start = lists_at_start + state.map_or(0, FrameState::lists_between);
         let foveated = state.is_some_and(|state| state.foveation.is_some());
         let choice = state.and_then(|state| state.choice);
+        let look_ahead = state.map_or(0, |state| state.look_ahead().blocks);
         let [width, height] = self.options.size;
         let cpu_ms = begin.elapsed().as_secs_f64() * 1e3;
         let pixels = width * height;
@@ -512,6 +482,7 @@ impl ProgressiveIsoRenderer {
             pixels,
             foveated,
             choice,
+            look_ahead,
             most_cells,
             pass_ms,
             stop_at,

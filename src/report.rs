@@ -27,6 +27,9 @@ pub struct PassReport {
     /// Share of the rays that the frame's first pass might cast: less than 1 where a frame is held to
     /// [`crate::FrameOptions::target_ms`].
     pub density: f32,
+    /// How far the pass looked ahead: [`crate::FrameOptions::look_ahead`], or 1 where a frame that is held to a time had
+    /// too much to decode.
+    pub look_ahead: u32,
     /// What the frame's first pass was predicted to take, in milliseconds, if it was.
     pub predicted_ms: Option<f64>,
     /// CPU time of the frame-time budget for this frame: pre-pass, prediction and learning, in milliseconds.

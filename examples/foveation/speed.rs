@@ -219,10 +219,11 @@ impl Speed {
     ) -> Self {
         let ms: Vec<f64> = contenders.iter_mut().map(Clocked::take_median).collect();
         let (full_ms, traced_ms) = (ms[0], ms[1]);
-        let stages = contenders.iter_mut().zip(&ms).enumerate().filter_map(|(i, (clocked, &ms))| {
-            let name = ["full", "traced"].get(i).copied();
-            clocked.take_stages(name.unwrap_or(clocked.filler.way.name), ms)
-        });
+        let stages =
+            contenders.iter_mut().zip(&ms).enumerate().filter_map(|(i, (clocked, &ms))| {
+                let name = ["full", "traced"].get(i).copied();
+                clocked.take_stages(name.unwrap_or(clocked.filler.way.name), ms)
+            });
         let stages = stages.collect();
         let Clocked { place, size, sampled, entered, .. } = contenders[1];
         let c_max = foveation.mean_density(size);

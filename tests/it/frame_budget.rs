@@ -111,6 +111,33 @@ fn a_frame_that_is_held_to_a_time_ends_with_the_same_picture() {
 }
 
 #[test]
+fn only_the_first_pass_of_a_frame_looks_ahead_less() {
+    let (gpu, scene) = (Gpu::new(), Scene::generated("turbulence", [45, 41, 38], 8.0));
+    let mut renderer = gpu.renderer(&scene, held(BudgetMode::Predicted, Residency::Cached));
+    for number in 0..4 {
+        // No density makes room for what a cold cache has to decode.
+        renderer.clear_cache();
+        let azimuth = 20.0 + 5.0 * f64::from(number);
+        renderer.set_frame(&frame(&scene, azimuth, Some(1e-3))).unwrap();
+        let mut passes = Vec::new();
+        let (device, queue) = (&gpu.device, &gpu.queue);
+        let last = renderer.render_to_completion(device, queue, |_, report| {
+            passes.extend((report.pass > 0).then_some((report.pass, report.look_ahead)));
+            true
+        });
+        assert!(last.unwrap().complete());
+        let asked = FrameOptions::default().look_ahead;
+        // The first frames are what is learned from.
+        let first = if number > 1 { 1 } else { asked };
+        let expected = |pass: u32| if pass == 1 { first } else { asked };
+        assert!(passes.len() > 1, "frame {number}: {passes:?}");
+        for (pass, look_ahead) in &passes {
+            assert_eq!(*look_ahead, expected(*pass), "frame {number}: {passes:?}");
+        }
+    }
+}
+
+#[test]
 fn times_are_predicted_once_something_was_measured() {
     let (gpu, scene) = (Gpu::new(), Scene::generated("turbulence", [45, 41, 38], 8.0));
     let mut renderer = gpu.renderer(&scene, held(BudgetMode::Predicted, Residency::Full));

@@ -87,7 +87,7 @@ impl PictureFormat {
         ledger.texture(device, Category::Outputs, &desc)
     }
 
-    /// An unfinished pixel, whose colour is `unfinished`, as `outputs_write_empty` writes it.
+    /// An unfinished pixel, whose colour is `unfinished`.
     fn unfinished(self, unfinished: [f32; 4]) -> wgpu::Color {
         let [r, g, b, a] = unfinished.map(f64::from);
         let first = |r: f64| wgpu::Color { r, ..wgpu::Color::TRANSPARENT };

@@ -210,7 +210,7 @@ impl Rays {
         (frame, shading): (&FrameParams, &ShadingParams),
         sampling: Option<&SamplingParams>,
     ) {
-        upload.write(device, encoder, &buffers.frame, 0, bytemuck::bytes_of(frame));
+        buffers.record_params(device, encoder, upload, frame);
         upload.write(device, encoder, &buffers.shading, 0, bytemuck::bytes_of(shading));
         // No ray has started.
         let words = RAYS_HEADER_WORDS + buffers.plan.numbers();
@@ -359,6 +359,17 @@ impl RayBuffers {
             foveation,
             _sums: sums,
         }
+    }
+
+    /// Records that what comes has these parameters. Those of one frame may only differ in how far rays look ahead.
+    pub fn record_params(
+        &self,
+        device: &wgpu::Device,
+        encoder: &mut wgpu::CommandEncoder,
+        upload: &mut UploadRing,
+        params: &FrameParams,
+    ) {
+        upload.write(device, encoder, &self.frame, 0, bytemuck::bytes_of(params));
     }
 
     /// Where the arguments of the list's first kernel are in [`Self::args`].

@@ -24,6 +24,7 @@ pub fn margin(tiles: &BlueNoise, params: &SamplingParams, pixel: [u32; 2]) -> f3
 pub fn not_drawn(params: &SamplingParams, pixel: [u32; 2]) -> f32 {
     let r = [0, 1].map(|a| (pixel[a] as f32 + 0.5) * params.share_per_pixel[a] - params.gaze[a]);
     // Of both axes, since the kernel works out a row's part once.
-    let fovea = r.map(|r| if params.falloff > 0.0 { (-params.falloff * (r * r)).exp() } else { 0.0 });
+    let fovea =
+        r.map(|r| if params.falloff > 0.0 { (-params.falloff * (r * r)).exp() } else { 0.0 });
     (1.0 - params.base_density) * (1.0 - fovea[1] * fovea[0])
 }
