@@ -64,7 +64,7 @@ static FULL: Plan = Plan {
     ],
     speed_densities: &[0.01, 0.03, 0.1, 0.4],
     frames: 3,
-    runs: 3,
+    runs: 7,
     densities: DENSITIES,
     middle_density: 0.03,
     quality_size: [640, 360],
