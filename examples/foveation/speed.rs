@@ -24,7 +24,8 @@ struct Case<'a> {
 const FILLS: &[Way] = &[PUSH_PULL, SPARSE_NO_COARSE];
 const ALL_FILLS: &[Way] = &[PUSH_PULL, SPARSE_NO_COARSE, SPARSE];
 
-/// Medians of wall times from setting a frame to its report.
+/// Medians of wall times from setting a frame to its report, and of how many times faster frames were than the full one
+/// before them.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Speed {
     pub volume: String,
@@ -204,8 +205,14 @@ impl Clocked {
         (!ms.is_empty()).then(|| Stages { frame: frame.to_owned(), ms, rest_ms })
     }
 
-    fn take_median(&mut self) -> f64 {
-        median(std::mem::take(&mut self.ms).into_iter())
+    fn median(&self) -> f64 {
+        median(self.ms.iter().copied())
+    }
+
+    /// How many times faster than `full`: the median over the runs, in which they took turns, since the machine's speed
+    /// changes between them.
+    fn speedup(&self, full: &Self) -> f64 {
+        median(full.ms.iter().zip(&self.ms).map(|(full, own)| full / own))
     }
 }
 
@@ -217,8 +224,9 @@ impl Speed {
         foveation: Foveation,
         contenders: &mut [Clocked],
     ) -> Self {
-        let ms: Vec<f64> = contenders.iter_mut().map(Clocked::take_median).collect();
-        let (full_ms, traced_ms) = (ms[0], ms[1]);
+        let ms: Vec<f64> = contenders.iter().map(Clocked::median).collect();
+        let speedups: Vec<f64> = contenders.iter().map(|own| own.speedup(&contenders[0])).collect();
+        let (full_ms, traced_ms, traced_speedup) = (ms[0], ms[1], speedups[1]);
         let stages =
             contenders.iter_mut().zip(&ms).enumerate().filter_map(|(i, (clocked, &ms))| {
                 let name = ["full", "traced"].get(i).copied();
@@ -227,11 +235,16 @@ impl Speed {
         let stages = stages.collect();
         let Clocked { place, size, sampled, entered, .. } = contenders[1];
         let c_max = foveation.mean_density(size);
-        let fill = |contender: (&Clocked, &f64)| Fill {
-            method: contender.0.filler.way.name.into(),
-            ms: *contender.1,
-            speedup: full_ms / contender.1,
-        };
+        let fills = contenders.iter().zip(&ms).zip(&speedups).skip(2);
+        let fills = fills.map(|((contender, &ms), &speedup)| Fill {
+            method: contender.filler.way.name.into(),
+            ms,
+            speedup,
+        });
+        let fills = fills.collect();
+        for contender in contenders {
+            contender.ms.clear();
+        }
         Self {
             volume: volume.name.clone(),
             place,
@@ -243,9 +256,9 @@ impl Speed {
             entered,
             full_ms,
             traced_ms,
-            traced_speedup: full_ms / traced_ms,
-            efficiency: full_ms / traced_ms * c_max,
-            fills: contenders[2..].iter().zip(&ms[2..]).map(fill).collect(),
+            traced_speedup,
+            efficiency: traced_speedup * c_max,
+            fills,
             stages,
         }
     }
