@@ -401,7 +401,11 @@ impl ProgressiveIsoRenderer {
         Self::choose_rays(&mut self.records, &self.options, state, clear);
         let frame = &state.frame;
         let params = state.params(&self.plan);
-        let shading = ShadingParams::new(&frame.options.shading, self.volume.world_from_index);
+        let mut shading = ShadingParams::new(&frame.options.shading, self.volume.world_from_index);
+        let fills = stages.infill.is_some() && frame.options.infill != Infill::Off;
+        if fills && frame.options.stop_at.is_none() {
+            shading = shading.filled();
+        }
         let next = (&state.view, &params);
         if frame.options.infill != Infill::Off || frame.options.guided {
             let follows = self.shown_isovalue == Some(isovalue);

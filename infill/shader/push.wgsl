@@ -29,7 +29,7 @@ fn keep_texel(index: u32, value: Average) {
 }
 
 // Of a finished pixel.
-fn pixel_average(pixel: vec2<u32>) -> Average {
+fn pixel_average(pixel: vec2<u32>, lines: FrameRays) -> Average {
     if (any(pixel >= params.size)) {
         return average_none();
     }
@@ -37,7 +37,7 @@ fn pixel_average(pixel: vec2<u32>) -> Average {
     if (all(normal == vec3<f32>(0.0))) {
         return Average(1.0, 0.0, vec3<f32>(0.0), 0.0);
     }
-    let t = frame_t(frame, frame_ray(frame, pixel), textureLoad(depth, pixel, 0).x);
+    let t = frame_t(frame, frame_ray_of(lines, pixel), textureLoad(depth, pixel, 0).x);
     return Average(1.0, 1.0, normal, t);
 }
 
@@ -59,10 +59,11 @@ fn main(
     let corner = infill_tile_corner(params, tiles[infill_list_word(params, LIST, select(0u, index, listed))]);
     let own = tile_place(lane);
     let holes = tile_word(corner, lane >> 3u) >> (4u * (lane & 7u));
+    let lines = frame_rays(frame);
     var sum = average_none();
     for (var child = 0u; child < 4u; child++) {
         if (((holes >> child) & 1u) == 0u) {
-            sum = average_plus(sum, pixel_average(corner + 2u * own + tile_place(child)), 1.0);
+            sum = average_plus(sum, pixel_average(corner + 2u * own + tile_place(child), lines), 1.0);
         }
     }
     let first = average_limited(sum);

@@ -1,5 +1,5 @@
 // Starts a frame: a bit for every ray that may hit something. The pictures, unfinished everywhere, get their background where
-// no ray has anything to hit.
+// no ray has anything to hit, unless they have its colour already.
 #import frame
 #import indirect
 #import macrocell_skip
@@ -60,13 +60,17 @@ fn tile_inside(lane: u32) -> bool {
 }
 
 // Starts a ray: (enters the volume, may hit something), 1 for yes.
-fn start(pixel: vec2<u32>, volume: DdaBox, box: DdaBox) -> vec2<u32> {
-    let ray = frame_ray(frame, pixel).ray;
+fn start(pixel: vec2<u32>, lines: FrameRays, volume: DdaBox, box: DdaBox) -> vec2<u32> {
+    let ray = frame_ray_of(lines, pixel).ray;
     // Whatever meets a part of the volume meets all of it.
     if (meets(ray, box)) {
         return vec2<u32>(1u);
     }
-    outputs_write_background(pixel);
+    if (pixel.x < shading.start_columns) {
+        outputs_write_background(pixel);
+    } else {
+        outputs_write_background_status(pixel);
+    }
     return vec2<u32>(u32(meets(ray, volume)), 0u);
 }
 
@@ -83,11 +87,13 @@ fn write_header(box: DdaBox) {
 fn start_word(number: u32, box: DdaBox, zero: u32) -> vec2<u32> {
     let volume = DdaBox(vec3<i32>(0), frame.grid.last_cell + vec3<i32>(i32(zero)));
     let corner = frame_pixel(frame, number);
+    let lines = frame_rays(frame);
+    let size = vec2<u32>(frame.width, frame.height);
     var counts = vec2<u32>(0u);
     for (var i = 0u; i < WORD_RAYS + zero; i++) {
         let pixel = word_pixel(corner, i);
-        if (pixel.x < frame.width && pixel.y < frame.height) {
-            let started = start(pixel, volume, box);
+        if (all(pixel < size)) {
+            let started = start(pixel, lines, volume, box);
             counts += vec2<u32>(started.x, started.y << i);
         }
     }

@@ -88,7 +88,7 @@ fn the_shading_uniform_has_the_declared_layout() {
         diffuse,
         specular,
         shininess,
-        pad0,
+        start_columns,
         normal_x,
         pad1,
         normal_y,

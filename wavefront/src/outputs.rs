@@ -299,7 +299,7 @@ pub struct ShadingParams {
     pub(crate) diffuse: f32,
     pub(crate) specular: f32,
     pub(crate) shininess: f32,
-    pub(crate) pad0: u32,
+    pub(crate) start_columns: u32,
     pub(crate) normal_x: [f32; 3],
     pub(crate) pad1: u32,
     pub(crate) normal_y: [f32; 3],
@@ -334,7 +334,8 @@ impl ShadingParams {
             }
         };
         Self {
-            background: shading.background,
+            // As the picture holds it, so that it does not matter who writes it.
+            background: shading.background.map(|c| (c.clamp(0.0, 1.0) * 255.0).round() / 255.0),
             unfinished: shading.unfinished,
             base_color: shading.base_color,
             ambient: shading.ambient,
@@ -343,7 +344,7 @@ impl ShadingParams {
             diffuse: shading.diffuse,
             specular: shading.specular,
             shininess: shading.shininess,
-            pad0: 0,
+            start_columns: u32::MAX,
             normal_x,
             pad1: 0,
             normal_y,
@@ -357,5 +358,16 @@ impl ShadingParams {
             world_z,
             pad6: 0,
         }
+    }
+    /// For frames whose unfinished pixels are all filled before they are shown: until then they look like the background,
+    /// which is not to be written then.
+    #[must_use]
+    pub fn filled(self) -> Self {
+        Self { start_columns: 0, ..self }
+    }
+
+    /// The colour of the picture when a frame starts.
+    pub(crate) fn start_color(&self) -> [f32; 4] {
+        if self.start_columns == 0 { self.background } else { self.unfinished }
     }
 }

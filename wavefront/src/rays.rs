@@ -216,7 +216,7 @@ impl Rays {
         let words = RAYS_HEADER_WORDS + buffers.plan.numbers();
         encoder.clear_buffer(&buffers.rays, 0, Some(4 * words));
         // A render pass's clearing costs a fraction of as many writes.
-        textures.record_unfinished(encoder, shading.unfinished);
+        textures.record_unfinished(encoder, shading.start_color());
         {
             let mut pass = begin(encoder, "wavefront.start");
             let groups = buffers.plan.numbers().div_ceil(u64::from(RAYS_PER_WORD_GROUP));

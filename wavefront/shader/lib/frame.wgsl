@@ -35,12 +35,33 @@ struct FrameRay {
     depth_per_voxel: f32, // view depth in world units gained per voxel along the ray
 }
 
-fn frame_ray(frame: FrameParams, pixel: vec2<u32>) -> FrameRay {
-    let offset = vec2<f32>(pixel) + vec2<f32>(0.5) - 0.5 * vec2<f32>(f32(frame.width), f32(frame.height));
-    let origin = frame.origin + offset.x * frame.origin_dx + offset.y * frame.origin_dy;
-    let direction = frame.direction + offset.x * frame.direction_dx + offset.y * frame.direction_dy;
+// What a pixel's ray is made of, for loops over pixels: lavapipe loads a uniform as if every lane had its own.
+struct FrameRays {
+    middle: vec2<f32>,
+    origin: vec3<f32>,
+    origin_dx: vec3<f32>,
+    origin_dy: vec3<f32>,
+    direction: vec3<f32>,
+    direction_dx: vec3<f32>,
+    direction_dy: vec3<f32>,
+}
+
+fn frame_rays(frame: FrameParams) -> FrameRays {
+    return FrameRays(
+        0.5 * vec2<f32>(f32(frame.width), f32(frame.height)), frame.origin, frame.origin_dx, frame.origin_dy,
+        frame.direction, frame.direction_dx, frame.direction_dy);
+}
+
+fn frame_ray_of(rays: FrameRays, pixel: vec2<u32>) -> FrameRay {
+    let offset = vec2<f32>(pixel) + vec2<f32>(0.5) - rays.middle;
+    let origin = rays.origin + offset.x * rays.origin_dx + offset.y * rays.origin_dy;
+    let direction = rays.direction + offset.x * rays.direction_dx + offset.y * rays.direction_dy;
     let depth_per_voxel = 1.0 / length(direction);
     return FrameRay(dda_ray(origin, direction * depth_per_voxel), depth_per_voxel);
+}
+
+fn frame_ray(frame: FrameParams, pixel: vec2<u32>) -> FrameRay {
+    return frame_ray_of(frame_rays(frame), pixel);
 }
 
 // Where a ray has a view depth in world units, in voxels.

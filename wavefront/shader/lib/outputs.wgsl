@@ -7,6 +7,10 @@ const STATUS_HIT: u32 = 1u;
 // Of an unfinished pixel, as the start of a frame makes them all: depth and normal are those of the background already.
 fn outputs_write_background(pixel: vec2<u32>) {
     textureStore(color_out, pixel, shading.background);
+    outputs_write_background_status(pixel);
+}
+
+fn outputs_write_background_status(pixel: vec2<u32>) {
 #ifdef OUTPUT_STATUS
     textureStore(status_out, pixel, vec4<u32>(STATUS_BACKGROUND));
 #endif

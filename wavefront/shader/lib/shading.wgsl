@@ -11,7 +11,7 @@ struct ShadingParams {
     diffuse: f32,
     specular: f32,
     shininess: f32,
-    pad0: u32,
+    start_columns: u32,    // of pixels that a frame's start gives the background's colour: none if they have it
     normal_x: vec3<f32>,   // columns of world_from_index's inverse transpose, up to a positive factor
     pad1: u32,
     normal_y: vec3<f32>,
