@@ -265,7 +265,7 @@ pub struct Shading {
     pub shininess: f32,
     /// The light.
     pub light: Light,
-    /// Pixels without a surface.
+    /// Pixels without a surface; rounded to 8 bits, as the picture holds it, before the surface is blended with it.
     pub background: [f32; 4],
     /// Pixels that are not known yet.
     pub unfinished: [f32; 4],
