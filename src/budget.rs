@@ -194,21 +194,27 @@ impl Budget {
         let begin = Instant::now();
         let Request { view, size, isovalue, target_ms, .. } = *request;
         let work = self.pre_pass.as_mut().map(|pre_pass| pre_pass.estimate(view, size, isovalue));
-        let mut outlook = work.map(|work| Outlook::new(request, &work, self.cached));
+        let cached = self.cached;
+        let outlook_of = |look_ahead| {
+            work.map(|w| Outlook::new(&Request { look_ahead, ..*request }, &w, cached))
+        };
         let mut look_ahead = request.look_ahead;
-        let density = match (self.mode, &mut outlook) {
+        let mut outlook = outlook_of(look_ahead);
+        let density = match (self.mode, &outlook) {
             _ if self.unusable >= MOST_UNUSABLE => 1.0,
             (BudgetMode::Fixed, _) => 1.0,
             (BudgetMode::TwoPass, _) => (self.after_last(target_ms) / 4.0).max(LEAST_DENSITY),
-            (BudgetMode::Predicted, Some(outlook)) if self.level.is_some() => {
-                let mut density = self.fitting(outlook, target_ms);
-                // What too few rays do not make room for may be what is decoded for later.
-                if self.cached && look_ahead > 1 && self.cautious_ms(outlook, density) > target_ms {
+            (BudgetMode::Predicted, Some(asked)) if self.level.is_some() => {
+                let density = self.fitting(asked, target_ms);
+                let is_too_long = self.cautious_ms(asked, density) > target_ms;
+                if cached && look_ahead > 1 && is_too_long {
+                    // What too few rays do not make room for may be what is decoded for later.
                     look_ahead = 1;
-                    *outlook = outlook.with_look_ahead(1);
-                    density = self.fitting(outlook, target_ms);
+                    outlook = outlook_of(look_ahead);
+                    outlook.map_or(density, |outlook| self.fitting(&outlook, target_ms))
+                } else {
+                    density
                 }
-                density
             }
             _ => self.after_last(target_ms),
         };
@@ -339,19 +345,13 @@ impl Outlook {
                 work.entered,
                 0.5 * (1.0 + work.depth_voxels).ln(),
                 2.0 * fresh,
-                look_ahead_feature(look_ahead),
+                0.3 * f64::from(look_ahead.max(1)).ln(),
                 0.3 * voxels_per_pixel.ln(),
                 0.5 * rays.ln(),
                 0.4 * direction[0],
                 0.4 * direction[1],
             ],
         }
-    }
-
-    fn with_look_ahead(self, look_ahead: u32) -> Self {
-        let mut features = self.features;
-        features[LOOK_AHEAD_FEATURE] = look_ahead_feature(look_ahead);
-        Self { look_ahead, features, ..self }
     }
 
     /// Work in visits of a block.
@@ -366,13 +366,6 @@ impl Outlook {
         features[0] = 0.7 * density.ln();
         features
     }
-}
-
-/// Where the look-ahead is among the features.
-const LOOK_AHEAD_FEATURE: usize = 5;
-
-fn look_ahead_feature(look_ahead: u32) -> f64 {
-    0.3 * f64::from(look_ahead.max(1)).ln()
 }
 
 /// Bytes of all coarse cells' ranges.

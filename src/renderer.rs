@@ -358,7 +358,8 @@ impl ProgressiveIsoRenderer {
         state.passes += 1;
         if state.passes == 2 && state.choice.is_some() {
             // From now on the frame looks as far ahead as it is asked to.
-            rendering.record_params(device, encoder, &mut self.upload, &state.params(&self.plan));
+            let params = state.params(&self.plan);
+            rendering.rays().record_params(device, encoder, &mut self.upload, &params);
         }
         let options = &state.frame.options;
         let pass_ms = options.pass_ms.min(options.target_ms.unwrap_or(f32::INFINITY));

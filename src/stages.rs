@@ -192,17 +192,6 @@ impl Rendering {
         self.rounds.record_start(encoder, &stages.rays, &self.rays);
     }
 
-    /// Records that the rounds to come have other parameters than those before.
-    pub(crate) fn record_params(
-        &self,
-        device: &wgpu::Device,
-        encoder: &mut wgpu::CommandEncoder,
-        upload: &mut UploadRing,
-        params: &FrameParams,
-    ) {
-        self.rays.record_params(device, encoder, upload, params);
-    }
-
     /// Records that another pass of a foveated frame casts more rays.
     pub(crate) fn record_mask(
         &self,

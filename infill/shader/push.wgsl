@@ -57,13 +57,13 @@ fn main(
     let index = indirect_linear_group(group, groups);
     let listed = index < tiles[LIST];
     let corner = infill_tile_corner(params, tiles[infill_list_word(params, LIST, select(0u, index, listed))]);
-    let own = tile_place(lane);
+    let own = frame_place(lane);
     let holes = tile_word(corner, lane >> 3u) >> (4u * (lane & 7u));
     let lines = frame_rays(frame);
     var sum = average_none();
     for (var child = 0u; child < 4u; child++) {
         if (((holes >> child) & 1u) == 0u) {
-            sum = average_plus(sum, pixel_average(corner + 2u * own + tile_place(child), lines), 1.0);
+            sum = average_plus(sum, pixel_average(corner + 2u * own + frame_place(child), lines), 1.0);
         }
     }
     let first = average_limited(sum);

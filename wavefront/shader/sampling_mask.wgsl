@@ -30,7 +30,7 @@ fn fovea(pixel: vec4<u32>, axis: u32) -> vec4<f32> {
 fn is_drawn(ranks: vec4<u32>, fovea: vec4<f32>) -> vec4<bool> {
     // Probability that one pass does not draw them.
     var left = (1.0 - sampling.base_density) * (vec4<f32>(1.0) - fovea);
-    if (sampling.draws > min(1u, ranks.x)) {
+    if (sampling.draws > 1u) {
         left = pow(max(left, vec4<f32>(1e-30)), vec4<f32>(f32(sampling.draws)));
     }
     // (rank + 0.5) / TILE_RANKS < 1 - left, without losing digits of a small `left`.

@@ -359,6 +359,7 @@ impl ShadingParams {
             pad6: 0,
         }
     }
+
     /// For frames whose unfinished pixels are all filled before they are shown: until then they look like the background,
     /// which is not to be written then.
     #[must_use]

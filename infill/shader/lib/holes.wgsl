@@ -36,7 +36,7 @@ fn holes_collect(corner: vec2<u32>, listed: bool, lane: u32) -> u32 {
 // The place in its tile of one of `count` holes.
 fn holes_place(index: u32, count: u32) -> vec2<u32> {
     if (count == INFILL_TILE_RAYS) {
-        return tile_place(index);
+        return frame_place(index);
     }
-    return tile_place(holes_inside[index]);
+    return frame_place(holes_inside[index]);
 }

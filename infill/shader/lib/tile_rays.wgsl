@@ -15,8 +15,3 @@ fn tile_word(corner: vec2<u32>, word: u32) -> u32 {
     }
     return rays[frame_active_word(frame, frame_number(frame, square)) + (word & 1u)];
 }
-
-// The place in the tile of one of its rays.
-fn tile_place(ray: u32) -> vec2<u32> {
-    return frame_even_bits(vec2<u32>(ray, ray >> 1u));
-}

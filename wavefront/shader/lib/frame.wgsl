@@ -141,6 +141,11 @@ fn frame_even_bits(code: vec2<u32>) -> vec2<u32> {
     return (v | (v >> vec2<u32>(4u))) & vec2<u32>(0x00ff00ffu);
 }
 
+// The place of a ray in its square, or of one of as many rays as a smaller square has, by the number there.
+fn frame_place(number: u32) -> vec2<u32> {
+    return frame_even_bits(vec2<u32>(number, number >> 1u));
+}
+
 // The pixel of a ray; outside the picture for numbers that have no ray.
 fn frame_pixel(frame: FrameParams, ray: u32) -> vec2<u32> {
     let bits = 2u * (3u + frame.ray_level);
@@ -149,7 +154,7 @@ fn frame_pixel(frame: FrameParams, ray: u32) -> vec2<u32> {
     // Exact for the fewer than 2^20 squares that there can be; an integer division is slow.
     let row = u32((f32(square) + 0.5) / f32(frame.ray_columns));
     let corner = vec2<u32>(square - row * frame.ray_columns, row);
-    return corner * (8u << frame.ray_level) + frame_even_bits(vec2<u32>(code, code >> 1u));
+    return corner * (8u << frame.ray_level) + frame_place(code);
 }
 
 // A number below 2^16 with a zero after each of its bits, of both components.
