@@ -356,11 +356,19 @@ fn pixels_are_filled_from_the_completeness_that_is_enough() {
     renderer.set_frame(&frame).unwrap();
     let (mut stopped, mut going) = (0, 0);
     let last = renderer
-        .render_to_completion(&gpu.device, &gpu.queue, |_, report| {
+        .render_to_completion(&gpu.device, &gpu.queue, |renderer, report| {
             if report.pass > 0 {
                 assert_eq!(report.stopped(), report.completeness() >= 0.7);
                 let expected = if report.stopped() { report.active_rays } else { 0 };
                 assert_eq!(report.filled_pixels, expected);
+                if !report.stopped() {
+                    let shown = renderer.capture_blocking(&gpu.device, &gpu.queue).unwrap();
+                    for (i, status) in shown.status.as_ref().unwrap().iter().enumerate() {
+                        let is_unfinished = *status == PixelStatus::Unfinished;
+                        let color = &shown.color[4 * i..4 * i + 4];
+                        assert!(!is_unfinished || *color == support::UNFINISHED, "pixel {i}");
+                    }
+                }
                 *(if report.stopped() { &mut stopped } else { &mut going }) += 1;
             }
             true
