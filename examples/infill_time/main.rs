@@ -32,8 +32,19 @@ const FRAMES: u32 = 3;
 const LEAST_COMPLETENESS: f64 = 0.5;
 
 /// Kernels, by the labels of their passes, as columns of the table.
-const STAGES: [&str; 9] =
-    ["scatter", "tiles", "push", "calibrate", "guess", "encode", "halves", "quarters", "fill"];
+const STAGES: [&str; 11] = [
+    "scatter",
+    "tiles",
+    "push",
+    "pull",
+    "calibrate",
+    "guess",
+    "encode",
+    "shrink",
+    "quarters",
+    "decode",
+    "fill",
+];
 
 /// Measures the stages of in-fill.
 #[derive(Parser)]

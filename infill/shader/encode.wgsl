@@ -1,5 +1,6 @@
-// The network's first convolution, of the features, over the tiles within two tiles of holes.
+// The network's first convolution, of the features of quads of 2x2 pixels, over the tiles within two tiles of holes.
 #import sources
+#import average
 #import conv
 #import shading
 #import indirect
@@ -9,42 +10,94 @@
 @group(0) @binding(2) var<uniform> params: InfillParams;
 @group(0) @binding(3) var<storage, read> rays: array<u32>;
 @group(0) @binding(4) var<storage, read> tiles: array<u32>;
-@group(0) @binding(5) var<storage, read> candidates: array<u32>;
-@group(0) @binding(6) var<storage, read> weights: array<vec2<u32>>;
+@group(0) @binding(5) var<storage, read> known: array<vec4<u32>>;
+@group(0) @binding(6) var<storage, read> weights: array<vec4<u32>>;
 @group(0) @binding(7) var<storage, read_write> outputs: array<vec2<u32>>;
-@group(0) @binding(8) var normals: texture_2d<f32>;
+#ifdef COARSE_FIELD
+@group(0) @binding(GUESSES_BINDING) var<storage, read> guesses: array<vec2<u32>>;
+#endif
 #ifdef HISTORY
-@group(0) @binding(9) var<storage, read> history_keys: array<u32>;
+@group(0) @binding(HISTORY_BINDING) var<storage, read> history_keys: array<u32>;
 #endif
 
 const LIST: u32 = 2u;
-const HALO: u32 = INFILL_TILE + 2u;
-const GROUPS: u32 = 4u;
-const CONV_MEMORY: u32 = HALO * HALO * GROUPS;
+const EDGE: u32 = INFILL_TILE / 2u; // quads of a tile
+const HALO: u32 = EDGE + 2u;
+const LAYER: ConvLayer = ConvLayer(WEIGHTS, 4u, 2u);
+const CONV_MEMORY: u32 = 2u * HALO * HALO;
 
-// What the network reads at a pixel, in groups of four: finished, its coverage, coverage times N.V; the same two of every
-// candidate; whether history has one; soft distances of coarse field, thin variant, neighbours, history.
-fn features_at(pixel: vec2<u32>) -> array<vec4<f32>, 4> {
-    let number = frame_number(frame, pixel);
-    let ray = frame_ray(frame, pixel).ray;
+// What is said about a quad beside its finished pixels.
+struct Guessed {
+    neighbours: vec2<f32>,
+    coarse: vec2<f32>,
+    thin: vec2<f32>,
+    history: vec2<f32>,
+    has_history: f32,
+    distances: vec4<f32>, // soft, of coarse field, its thin variant, neighbours, history
+}
+
+// The nearest of the hits of the previous frame in the holes of a quad: its key.
+fn nearest_key(quad: vec2<u32>, holes: u32) -> u32 {
+    var key = 0u;
+    for (var child = 0u; child < 4u; child++) {
+        if (((holes >> child) & 1u) != 0u) {
+            key = max(key, sources_key(2u * quad + frame_place(child)));
+        }
+    }
+    return key;
+}
+
+fn guessed(quad: vec2<u32>, holes: u32, average: Average, ray: DdaRay, to_viewer: vec3<f32>) -> Guessed {
+    let number = frame_number(frame, 2u * quad + quad_first_hole(holes));
+    let words = sources_coarse(quad);
+    let coarse = candidate_unpack(words.x);
+    let thin = candidate_unpack(words.y);
+    let history = candidate_unpack(sources_history(nearest_key(quad, holes), ray, number));
+    var found = Guessed(
+        vec2<f32>(0.0), candidate_pair(coarse, to_viewer), candidate_pair(thin, to_viewer),
+        candidate_pair(history, to_viewer),
+        select(0.0, 1.0, history.valid),
+        vec4<f32>(coarse.soft_distance, thin.soft_distance, 0.0, history.soft_distance));
+#ifdef NEIGHBOURS
+    if (average.coverage > 0.0) {
+        let normal = shading_safe_normalize(average.normal, to_viewer);
+        let coverage = average.coverage / average.weight;
+        found.neighbours = coverage * vec2<f32>(1.0, clamp(dot(normal, to_viewer), 0.0, 1.0));
+        found.distances.z = candidate_soft_distance(average.t / average.coverage - infill_t_low(ray, number));
+    }
+#endif
+    return found;
+}
+
+// What the network reads of a quad, in groups of four: the share that is finished, that times its coverage and coverage N.V; the same
+// two of every candidate for what is holes; whether history has one; soft distances.
+fn features_at(quad: vec2<u32>, lines: FrameRays) -> array<vec4<f32>, 4> {
+    let holes = quad_holes(quad);
+    let inside = min(params.size - 2u * quad, vec2<u32>(2u));
+    let hole_share = 0.25 * f32(countOneBits(holes));
+    let done = 0.25 * f32(inside.x * inside.y) - hole_share;
+    let ray = frame_ray_of(lines, 2u * quad + quad_first_hole(holes)).ray;
     let to_viewer = shading_to_viewer(ray.direction);
-    if (!infill_is_hole(number)) {
-        let normal = textureLoad(normals, pixel, 0).xyz;
-        let c = select(0.0, 1.0, any(normal != vec3<f32>(0.0)));
-        let cn = clamp(dot(normal, to_viewer), 0.0, 1.0);
+    // Of the finished pixels, if there are any.
+    let average = average_unpack(known[quad_index(quad)]);
+    let mean = vec2<f32>(average.coverage, clamp(dot(average.normal, to_viewer), 0.0, 1.0));
+    let finished = select(vec2<f32>(0.0), mean, done > 0.0);
+    let own = done * finished;
+    if (holes == 0u) {
         return array<vec4<f32>, 4>(
-            vec4<f32>(1.0, c, cn, c), vec4<f32>(cn, c, cn, c), vec4<f32>(cn, 1.0, c, cn), vec4<f32>(0.0));
+            vec4<f32>(done, own, finished.x), vec4<f32>(finished.y, own, own.x),
+            vec4<f32>(own.y, done, own), vec4<f32>(0.0));
     }
-    var found = sources_candidates(sources_guesses(pixel), pixel, ray, number);
-    var cn = vec4<f32>(0.0);
-    for (var i = 0u; i < 4u; i++) {
-        cn[i] = found[i].coverage * candidate_facing(found[i], to_viewer);
-    }
+    let guess = guessed(quad, holes, average, ray, to_viewer);
+    let near = select(guess.neighbours, finished, done > 0.0);
+    let coarse = own + hole_share * guess.coarse;
+    let thin = own + hole_share * guess.thin;
+    let history = own + hole_share * guess.history;
     return array<vec4<f32>, 4>(
-        vec4<f32>(0.0, 0.0, 0.0, found[0].coverage),
-        vec4<f32>(cn.x, found[1].coverage, cn.y, found[2].coverage),
-        vec4<f32>(cn.z, select(0.0, 1.0, found[3].valid), found[3].coverage, cn.w),
-        vec4<f32>(found[1].soft_distance, found[2].soft_distance, found[0].soft_distance, found[3].soft_distance),
+        vec4<f32>(done, own, near.x),
+        vec4<f32>(near.y, coarse, thin.x),
+        vec4<f32>(thin.y, done + hole_share * guess.has_history, history),
+        hole_share * guess.distances,
     );
 }
 
@@ -57,28 +110,16 @@ fn main(
     let index = indirect_linear_group(group, groups);
     let listed = index < tiles[LIST];
     let corner = infill_tile_corner(params, tiles[infill_list_word(params, LIST, select(0u, index, listed))]);
+    let lines = frame_rays(frame);
     for (var i = lane; i < HALO * HALO; i += CONV_LANES) {
-        let pixel = vec2<i32>(corner + vec2<u32>(i % HALO, i / HALO)) - vec2<i32>(1);
-        var features = array<vec4<f32>, GROUPS>();
-        if (infill_inside(params, pixel)) {
-            features = features_at(vec2<u32>(pixel));
+        let quad = vec2<i32>(corner / 2u + vec2<u32>(i % HALO, i / HALO)) - vec2<i32>(1);
+        var features = array<vec4<f32>, 4>();
+        if (infill_inside(params, 2 * quad)) {
+            features = features_at(vec2<u32>(quad), lines);
         }
-        for (var channels = 0u; channels < GROUPS; channels++) {
-            conv_memory[GROUPS * i + channels] = conv_pack(features[channels]);
-        }
+        conv_memory[2u * i] = conv_pack_pair(features[0], features[1]);
+        conv_memory[2u * i + 1u] = conv_pack_pair(features[2], features[3]);
     }
     workgroupBarrier();
-    let strips = conv_strips(INFILL_TILE);
-    for (var i = lane; i < strips * INFILL_TILE; i += CONV_LANES) {
-        let inside = vec2<u32>(CONV_STRIP * (i % strips), i / strips);
-        let values = conv_outputs(ConvTexels(0u, HALO, GROUPS), inside, FIRST_WEIGHTS, 1u, 0u);
-        let texel = corner + inside;
-        // The maps are multiples of 4 texels wide.
-        if (listed && all(texel < params.padded)) {
-            let first = texel.x + params.padded.x * texel.y;
-            for (var k = 0u; k < CONV_STRIP; k++) {
-                outputs[first + k] = values[k];
-            }
-        }
-    }
+    conv_tile(LAYER, ConvTile(corner / 2u, EDGE, params.padded / 2u), listed, lane);
 }

@@ -1,14 +1,14 @@
-// The colour of every hole: that of unfinished pixels where there is no candidate. Finished pixels are not touched.
-// With the network: its way back from the coarser levels. Without: the candidates, too. A workgroup for every tile with
-// holes.
+// The colour of every hole: that of unfinished pixels where there is no candidate. Finished pixels are not touched. A workgroup
+// for every tile with holes.
 #import sources
 #import mix
-#import indirect
-#ifdef NETWORK
-#import decode
-#else
-#import guesses
 #import holes
+#import indirect
+#ifdef NEIGHBOURS
+#import pulled
+#endif
+#ifdef NETWORK
+#import head
 #endif
 
 @group(0) @binding(0) var<uniform> frame: FrameParams;
@@ -17,18 +17,18 @@
 @group(0) @binding(3) var<storage, read> rays: array<u32>;
 @group(0) @binding(4) var<storage, read_write> tiles: array<atomic<u32>>;
 @group(0) @binding(5) var color_out: texture_storage_2d<rgba8unorm, write>;
+#ifdef COARSE_FIELD
+@group(0) @binding(GUESSES_BINDING) var<storage, read> guesses: array<vec2<u32>>;
+#endif
 #ifdef HISTORY
 @group(0) @binding(HISTORY_BINDING) var<storage, read> history_keys: array<u32>;
 #endif
-#ifdef NETWORK
-@group(0) @binding(NETWORK_BINDING) var<storage, read> candidates: array<u32>;
-@group(0) @binding(NETWORK_BINDING + 1u) var<storage, read> weights: array<vec2<u32>>;
-@group(0) @binding(NETWORK_BINDING + 2u) var<storage, read> encoded: array<vec2<u32>>;
-@group(0) @binding(NETWORK_BINDING + 3u) var<storage, read> halves: array<vec2<u32>>;
-@group(0) @binding(NETWORK_BINDING + 4u) var<storage, read> quarters: array<vec2<u32>>;
-#endif
 #ifdef NEIGHBOURS
-@group(0) @binding(AVERAGES_BINDING) var<storage, read> averages: array<vec4<u32>>;
+@group(0) @binding(PULLED_BINDING) var<storage, read> pulled: array<vec4<u32>>;
+#endif
+#ifdef NETWORK
+@group(0) @binding(NETWORK_BINDING) var<storage, read> weights: array<vec4<u32>>;
+@group(0) @binding(NETWORK_BINDING + 1u) var<storage, read> decoded: array<vec4<u32>>;
 #endif
 
 const LIST: u32 = 0u;
@@ -36,9 +36,23 @@ const LANES: u32 = 64u;
 
 var<workgroup> filled_count: atomic<u32>;
 
-fn hints(words: vec2<u32>) -> MixHints {
+fn neighbours(pixel: vec2<u32>, to_viewer: vec3<f32>) -> u32 {
+#ifdef NEIGHBOURS
+    let average = pulled_pixel(pixel);
+    if (average.weight > 0.0) {
+        let normal = shading_safe_normalize(average.normal, to_viewer);
+        return candidate_pack(average.coverage / average.weight, normal, 0.0);
+    }
+#endif
+    return CANDIDATE_NONE;
+}
+
+fn hints(pixel: vec2<u32>, found: array<Candidate, 4>, to_viewer: vec3<f32>) -> MixHints {
 #ifdef NETWORK
-    let network = decode_head(words);
+    let own = mat2x4<f32>(
+        vec4<f32>(candidate_pair(found[0], to_viewer), candidate_pair(found[1], to_viewer)),
+        vec4<f32>(candidate_pair(found[2], to_viewer), candidate_pair(found[3], to_viewer)));
+    let network = head_outputs(pixel, own);
     return MixHints(network[0], network[1].xy, network[1].z);
 #else
     // Loaded, so that the mixture is computed as with a network of zeros.
@@ -46,11 +60,17 @@ fn hints(words: vec2<u32>) -> MixHints {
 #endif
 }
 
-// `words`: what the network has for the pixel.
-fn fill(pixel: vec2<u32>, number: u32, guesses: vec3<u32>, words: vec2<u32>) -> bool {
+fn fill(pixel: vec2<u32>) -> bool {
     let ray = frame_ray(frame, pixel).ray;
     let to_viewer = shading_to_viewer(ray.direction);
-    let mixed = mix_candidates(sources_candidates(guesses, pixel, ray, number), hints(words), to_viewer);
+    let coarse = sources_coarse(pixel / 2u);
+    let found = array<Candidate, 4>(
+        candidate_unpack(neighbours(pixel, to_viewer)),
+        candidate_unpack(coarse.x),
+        candidate_unpack(coarse.y),
+        candidate_unpack(sources_history(sources_key(pixel), ray, frame_number(frame, pixel))),
+    );
+    let mixed = mix_candidates(found, hints(pixel, found, to_viewer), to_viewer);
     var color = shading.unfinished;
     if (mixed.filled) {
         let coverage = select(mixed.coverage, step(0.5, mixed.coverage), params.crisp != 0u);
@@ -62,42 +82,6 @@ fn fill(pixel: vec2<u32>, number: u32, guesses: vec3<u32>, words: vec2<u32>) -> 
     return mixed.filled;
 }
 
-#ifdef NETWORK
-fn fill_tile(corner: vec2<u32>, listed: bool, lane: u32) {
-    decode_tile(corner, lane);
-    let strips = conv_strips(INFILL_TILE);
-    var filled = 0u;
-    for (var i = lane; i < strips * INFILL_TILE; i += LANES) {
-        let inside = vec2<u32>(CONV_STRIP * (i % strips), i / strips);
-        var words = decode_strip(inside);
-        for (var k = 0u; k < CONV_STRIP; k++) {
-            let pixel = corner + inside + vec2<u32>(k, 0u);
-            let number = frame_number(frame, pixel);
-            if (listed && all(pixel < params.size) && infill_is_hole(number)) {
-                filled += u32(fill(pixel, number, sources_guesses(pixel), words[k]));
-            }
-        }
-    }
-    atomicAdd(&filled_count, filled);
-}
-#else
-fn fill_tile(corner: vec2<u32>, listed: bool, lane: u32) {
-    let count = holes_collect(corner, listed, lane);
-#ifdef NEIGHBOURS
-    pull_tile(corner, lane);
-#endif
-    let share = infill_share(atomicLoad(&tiles[TILES_SHARES]), atomicLoad(&tiles[TILES_SAMPLES]));
-    var filled = 0u;
-    for (var i = lane; i < count; i += LANES) {
-        let inside = holes_place(i, count);
-        let pixel = corner + inside;
-        let number = frame_number(frame, pixel);
-        filled += u32(fill(pixel, number, guesses(pixel, number, inside, share), vec2<u32>(0u)));
-    }
-    atomicAdd(&filled_count, filled);
-}
-#endif
-
 @compute @workgroup_size(LANES)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
@@ -107,12 +91,16 @@ fn main(
     if (lane == 0u) {
         atomicStore(&filled_count, 0u);
     }
-    workgroupBarrier();
     let index = indirect_linear_group(group, groups);
     let listed = index < atomicLoad(&tiles[LIST]);
     let word = infill_list_word(params, LIST, select(0u, index, listed));
     let corner = infill_tile_corner(params, atomicLoad(&tiles[word]));
-    fill_tile(corner, listed, lane);
+    let count = holes_collect(corner, listed, lane);
+    var filled = 0u;
+    for (var i = lane; i < count; i += LANES) {
+        filled += u32(fill(corner + holes_place(i, count)));
+    }
+    atomicAdd(&filled_count, filled);
     workgroupBarrier();
     if (lane == 0u) {
         atomicAdd(&tiles[TILES_FILLED], atomicLoad(&filled_count));

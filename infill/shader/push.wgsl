@@ -1,5 +1,5 @@
-// Averages of the finished pixels, from 2x2 pixels to 16x16. A workgroup for every tile with holes and its
-// neighbours, an invocation for 2x2 pixels.
+// Averages of the finished pixels, from 2x2 pixels to 16x16. A workgroup for every tile of LIST, an invocation for 2x2
+// pixels.
 #import infill_params
 #import tile_rays
 #import average
@@ -12,8 +12,6 @@
 @group(0) @binding(4) var<storage, read_write> averages: array<vec4<u32>>;
 @group(0) @binding(5) var depth: texture_2d<f32>;
 @group(0) @binding(6) var normals: texture_2d<f32>;
-
-const LIST: u32 = 1u;
 
 // Two vectors of each: a load costs some drivers as much for four numbers as for one.
 var<workgroup> texels: array<vec4<f32>, 128>;

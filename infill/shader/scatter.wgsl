@@ -1,4 +1,4 @@
-// The previous frame's hits into the next picture. One invocation per pixel of the previous frame, whose pictures are
+// The previous frame's hits into the next picture. One invocation for 2x2 pixels of the previous frame, whose pictures are
 // still there.
 #import infill_params
 #import history
@@ -25,22 +25,30 @@ struct ScatterParams {
 
 const FARTHEST: f32 = 3.0e38;
 
-fn place_hit(position: vec4<f32>, normal: vec3<f32>) {
-    let w = dot(scatter.w, position);
-    let place = vec2<f32>(dot(scatter.column, position), dot(scatter.row, position)) / w;
-    let inside = all(place >= vec2<f32>(0.0)) && all(place < vec2<f32>(params.size));
+// What a loop over pixels reads of the next frame, loaded once.
+struct NextFrame {
+    scatter: ScatterParams,
+    lines: FrameRays,
+    size: vec2<u32>,
+    volume: DdaBox,
+}
+
+fn place_hit(next: NextFrame, position: vec4<f32>, normal: vec3<f32>) {
+    let w = dot(next.scatter.w, position);
+    let place = vec2<f32>(dot(next.scatter.column, position), dot(next.scatter.row, position)) / w;
+    let inside = all(place >= vec2<f32>(0.0)) && all(place < vec2<f32>(next.size));
     if (!(w > 0.0 && inside)) {
         return;
     }
     let pixel = vec2<u32>(place);
-    let frame_ray = frame_ray(frame, pixel);
+    let frame_ray = frame_ray_of(next.lines, pixel);
     let ray = frame_ray.ray;
-    if (!dda_meets(ray, infill_volume()) || dot(normal, shading_to_viewer(ray.direction)) <= 0.0) {
+    if (!dda_meets(ray, next.volume) || dot(normal, shading_to_viewer(ray.direction)) <= 0.0) {
         return;
     }
-    let t = frame_t(frame, frame_ray, dot(scatter.depth, position));
-    let key = history_key(t - dda_entry(ray, infill_volume()).t, normal);
-    atomicMax(&keys[infill_pixel_index(params, pixel)], key);
+    let t = frame_t(frame, frame_ray, dot(next.scatter.depth, position));
+    let key = history_key(t - dda_entry(ray, next.volume).t, normal);
+    atomicMax(&keys[pixel.x + next.size.x * pixel.y], key);
 }
 
 @compute @workgroup_size(64)
@@ -49,17 +57,23 @@ fn main(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let number = indirect_linear_group(group, groups) * 64u + lane;
-    let pixel = frame_pixel(old_frame, number);
-    if (number >= old_frame.ray_numbers || any(pixel >= params.size)) {
+    let number = 4u * (indirect_linear_group(group, groups) * 64u + lane);
+    if (number >= old_frame.ray_numbers) {
         return;
     }
-    let view_depth = textureLoad(depth, pixel, 0).x;
-    if (view_depth >= FARTHEST) {
-        return;
+    let corner = frame_pixel(old_frame, number);
+    let old_lines = frame_rays(old_frame);
+    let next = NextFrame(scatter, frame_rays(frame), params.size, infill_volume());
+    for (var child = 0u; child < 4u; child++) {
+        let pixel = corner + frame_place(child);
+        if (all(pixel < next.size)) {
+            let view_depth = textureLoad(depth, pixel, 0).x;
+            if (view_depth < FARTHEST) {
+                let frame_ray = frame_ray_of(old_lines, pixel);
+                let t = frame_t(old_frame, frame_ray, view_depth);
+                let position = frame_ray.ray.origin + t * frame_ray.ray.direction;
+                place_hit(next, vec4<f32>(position, 1.0), textureLoad(normals, pixel, 0).xyz);
+            }
+        }
     }
-    let frame_ray = frame_ray(old_frame, pixel);
-    let t = frame_t(old_frame, frame_ray, view_depth);
-    let position = frame_ray.ray.origin + t * frame_ray.ray.direction;
-    place_hit(vec4<f32>(position, 1.0), textureLoad(normals, pixel, 0).xyz);
 }

@@ -9,7 +9,7 @@ use wavefront::{FrameParams, ShadingParams};
 
 use crate::options::{DOUBT, PRIOR};
 use crate::plan::InfillPlan;
-use crate::weights::{LAYERS, Layer, PackedWeights};
+use crate::weights::PackedWeights;
 
 macro_rules! modules {
     ($($name:ident = $text:literal),* $(,)?) => {
@@ -18,21 +18,22 @@ macro_rules! modules {
 }
 
 /// What kernels of this crate import from it.
-const LIBRARY: [Module; 15] = modules![
+const LIBRARY: [Module; 16] = modules![
     infill_params = "infill_params.wgsl",
     infill_rays = "infill_rays.wgsl",
     candidate = "candidate.wgsl",
     average = "average.wgsl",
-    pull = "pull.wgsl",
+    pulled = "pulled.wgsl",
     coarse_field = "coarse_field.wgsl",
     march = "march.wgsl",
-    guesses = "guesses.wgsl",
+    quads = "quads.wgsl",
     tile_rays = "tile_rays.wgsl",
     holes = "holes.wgsl",
     history = "history.wgsl",
     sources = "sources.wgsl",
+    conv_texel = "conv_texel.wgsl",
     conv = "conv.wgsl",
-    decode = "decode.wgsl",
+    head = "head.wgsl",
     mix = "mix.wgsl",
 ];
 
@@ -49,10 +50,13 @@ const MARK: Module = entry!("mark");
 const TILES: Module = entry!("tiles");
 const TILE_ARGS: Module = entry!("tile_args");
 const PUSH: Module = entry!("push");
+const PULL: Module = entry!("pull");
 const CALIBRATE: Module = entry!("calibrate");
 const GUESS: Module = entry!("guess");
 const ENCODE: Module = entry!("encode");
-const PAIR: Module = entry!("pair");
+const SHRINK: Module = entry!("shrink");
+const QUARTERS: Module = entry!("quarters");
+const DECODE: Module = entry!("decode");
 const FILL: Module = entry!("fill");
 
 /// Uniform struct `InfillParams` of `shader/lib/infill_params.wgsl`.
@@ -88,26 +92,11 @@ const READ: Binding = Binding::StorageRead { min_bytes: 4 };
 const READ_WRITE: Binding = Binding::StorageReadWrite { min_bytes: 4 };
 const PAIRS: Binding = Binding::StorageRead { min_bytes: 8 };
 const PAIRS_WRITE: Binding = Binding::StorageReadWrite { min_bytes: 8 };
-const AVERAGES: Binding = Binding::StorageRead { min_bytes: 16 };
+const VECTORS: Binding = Binding::StorageRead { min_bytes: 16 };
+const VECTORS_WRITE: Binding = Binding::StorageReadWrite { min_bytes: 16 };
 const TEXTURE: Binding =
     Binding::TextureSample { sample: wgpu::TextureSampleType::Float { filterable: false } };
 const COLOR: Binding = Binding::TextureWrite { format: wgpu::TextureFormat::Rgba8Unorm };
-
-/// Two convolutions of a coarser level.
-#[derive(Clone, Copy, Debug)]
-struct Pair {
-    label: &'static str,
-    /// The first of the two among [`LAYERS`].
-    layer: usize,
-    /// 1 for halves, 2 for quarters.
-    level: u32,
-}
-
-/// The convolutions of the coarser levels on the way down.
-const PAIRS_OF_LAYERS: [Pair; 2] = [
-    Pair { label: "infill.halves", layer: 1, level: 1 },
-    Pair { label: "infill.quarters", layer: 3, level: 2 },
-];
 
 fn source(
     label: &'static str,
@@ -149,9 +138,14 @@ pub(crate) fn tile_args() -> KernelSource {
     source("infill.tile_args", TILE_ARGS, vec![READ, READ_WRITE], &[])
 }
 
-pub(crate) fn push() -> KernelSource {
-    let averages = Binding::StorageReadWrite { min_bytes: 16 };
-    source("infill.push", PUSH, vec![FRAME, PARAMS, READ, READ, averages, TEXTURE, TEXTURE], &[])
+pub(crate) fn push(plan: &InfillPlan) -> KernelSource {
+    let bindings = vec![FRAME, PARAMS, READ, READ, VECTORS_WRITE, TEXTURE, TEXTURE];
+    source("infill.push", PUSH, bindings, &[("LIST", Constant::U32(plan.averages_list()))])
+}
+
+pub(crate) fn pull(plan: &InfillPlan) -> KernelSource {
+    let bindings = vec![PARAMS, READ, VECTORS, VECTORS_WRITE];
+    source("infill.pull", PULL, bindings, &[("LIST", Constant::U32(plan.averages_list()))])
 }
 
 pub(crate) fn calibrate(plan: &InfillPlan) -> KernelSource {
@@ -161,24 +155,24 @@ pub(crate) fn calibrate(plan: &InfillPlan) -> KernelSource {
 }
 
 pub(crate) fn guess(plan: &InfillPlan) -> KernelSource {
-    let mut bindings = vec![FRAME, SHADING, PARAMS, READ, READ, READ_WRITE];
-    let mut constants = guesses(&mut bindings, plan);
-    constants.push(("NETWORK", Constant::Bool(true)));
+    let mut bindings = vec![FRAME, SHADING, PARAMS, READ, READ, PAIRS_WRITE];
+    let constants = coarse_field(&mut bindings, plan);
     source("infill.guess", GUESS, bindings, &constants)
 }
 
-/// Adds the bindings of what `shader/lib/guesses.wgsl` reads; constants for it.
-fn guesses(bindings: &mut Vec<Binding>, plan: &InfillPlan) -> Vec<(&'static str, Constant)> {
+/// Adds the bindings of what `shader/lib/sources.wgsl` reads; constants for it.
+fn sources(bindings: &mut Vec<Binding>, plan: &InfillPlan) -> Vec<(&'static str, Constant)> {
     let sources = plan.sources();
     let mut constants = Vec::new();
-    if sources.neighbours {
-        constants.push(("NEIGHBOURS", Constant::Bool(true)));
-        constants.push(("AVERAGES_BINDING", next(bindings)));
-        bindings.push(AVERAGES);
-    }
     if sources.coarse_field {
         constants.push(("COARSE_FIELD", Constant::Bool(true)));
-        constants.extend(coarse_field(bindings, plan));
+        constants.push(("GUESSES_BINDING", next(bindings)));
+        bindings.push(PAIRS);
+    }
+    if sources.history {
+        constants.push(("HISTORY", Constant::Bool(true)));
+        constants.push(("HISTORY_BINDING", next(bindings)));
+        bindings.push(READ);
     }
     constants
 }
@@ -202,35 +196,32 @@ fn coarse_field(bindings: &mut Vec<Binding>, plan: &InfillPlan) -> [(&'static st
     ]
 }
 
-/// First vector of a layer's weights.
+/// First pair of a layer's weights.
 fn weights(layer: usize) -> Constant {
     Constant::U32(PackedWeights::first()[layer])
 }
 
 pub(crate) fn encode(plan: &InfillPlan) -> KernelSource {
-    let mut bindings = vec![FRAME, SHADING, PARAMS, READ, READ, READ, PAIRS, PAIRS_WRITE, TEXTURE];
-    let mut constants = vec![("NETWORK", Constant::Bool(true)), ("FIRST_WEIGHTS", weights(0))];
-    if plan.sources().history {
-        constants.push(("HISTORY", Constant::Bool(true)));
-        bindings.push(READ);
-    }
+    let mut bindings = vec![FRAME, SHADING, PARAMS, READ, READ, VECTORS, VECTORS, PAIRS_WRITE];
+    let mut constants = sources(&mut bindings, plan);
+    constants.push(("WEIGHTS", weights(0)));
+    constants.push(("NEIGHBOURS", Constant::Bool(plan.sources().neighbours)));
     source("infill.encode", ENCODE, bindings, &constants)
 }
 
-/// Halves, then quarters.
-pub(crate) fn pairs() -> [KernelSource; 2] {
-    PAIRS_OF_LAYERS.map(|Pair { label, layer, level }| {
-        let groups = |channels: usize| Constant::U32(channels.div_ceil(4) as u32);
-        let Layer { inputs, outputs, .. } = LAYERS[layer];
-        let constants = [
-            ("LEVEL", Constant::U32(level)),
-            ("GROUPS_IN", groups(inputs)),
-            ("GROUPS_OUT", groups(outputs)),
-            ("FIRST_WEIGHTS", weights(layer)),
-            ("SECOND_WEIGHTS", weights(layer + 1)),
-        ];
-        source(label, PAIR, vec![PARAMS, READ, PAIRS, PAIRS, PAIRS_WRITE], &constants)
-    })
+pub(crate) fn shrink() -> KernelSource {
+    let bindings = vec![PARAMS, READ, VECTORS, VECTORS, PAIRS_WRITE];
+    source("infill.shrink", SHRINK, bindings, &[("WEIGHTS", weights(1))])
+}
+
+pub(crate) fn quarters() -> KernelSource {
+    let bindings = vec![PARAMS, READ, VECTORS, VECTORS, PAIRS_WRITE];
+    source("infill.quarters", QUARTERS, bindings, &[("WEIGHTS", weights(2))])
+}
+
+pub(crate) fn decode() -> KernelSource {
+    let bindings = vec![PARAMS, READ, VECTORS, VECTORS, VECTORS, PAIRS_WRITE];
+    source("infill.decode", DECODE, bindings, &[("WEIGHTS", weights(3))])
 }
 
 pub(crate) fn fill(plan: &InfillPlan, network: bool) -> KernelSource {
@@ -242,21 +233,18 @@ pub(crate) fn fill(plan: &InfillPlan, network: bool) -> KernelSource {
         ("PRIOR_HISTORY", Constant::F32(PRIOR[3])),
         ("DOUBT", Constant::F32(DOUBT)),
     ];
-    if plan.sources().history {
-        constants.push(("HISTORY", Constant::Bool(true)));
-        constants.push(("HISTORY_BINDING", next(&bindings)));
-        bindings.push(READ);
+    constants.extend(sources(&mut bindings, plan));
+    if plan.sources().neighbours {
+        constants.push(("NEIGHBOURS", Constant::Bool(true)));
+        constants.push(("PULLED_BINDING", next(&bindings)));
+        bindings.push(VECTORS);
     }
     if network {
-        constants.push(("HALF_WEIGHTS", weights(5)));
-        constants.push(("LAST_WEIGHTS", weights(6)));
-        constants.push(("HEAD_WEIGHTS", weights(7)));
+        constants.push(("HIDDEN_WEIGHTS", weights(4)));
+        constants.push(("HEAD_WEIGHTS", weights(5)));
         constants.push(("NETWORK", Constant::Bool(true)));
         constants.push(("NETWORK_BINDING", next(&bindings)));
-        bindings.push(READ);
-        bindings.extend([PAIRS; 4]);
-    } else {
-        constants.extend(guesses(&mut bindings, plan));
+        bindings.extend([VECTORS; 2]);
     }
     let label = if network { "infill.fill.network" } else { "infill.fill.classical" };
     source(label, FILL, bindings, &constants)

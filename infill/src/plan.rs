@@ -26,9 +26,10 @@ const TILES_HEADER_WORDS: u64 = 6;
 pub(crate) const ARGS_BYTES: u64 = 16 * LISTS;
 pub(crate) const GATE_BYTES: u64 = 16;
 
-/// Bytes of a texel of averages, and of four channels of a map.
+/// Bytes of a texel of averages, of four channels of a map's texel, and of what the coarse field says about a quad.
 const AVERAGE_BYTES: u64 = 16;
 const GROUP_BYTES: u64 = 8;
+const GUESS_BYTES: u64 = 8;
 
 /// What a scene's in-fill consists of and the sizes of everything that this crate allocates for it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -71,7 +72,7 @@ impl InfillPlan {
             coarse_per_page: ranges.coarse_per_page(),
         };
         let available = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        let needed = plan.candidate_bytes().max(plan.shared_bytes());
+        let needed = plan.average_bytes().max(plan.map_bytes()).max(plan.history_bytes());
         if needed > available {
             let [width, height] = size;
             return Err(Error::PictureSize { width, height, needed, available });
@@ -138,9 +139,23 @@ impl InfillPlan {
         TILES_HEADER_WORDS + (x * y).div_ceil(32)
     }
 
-    /// Bytes of the candidates as the network reads them; 0 without it.
-    pub(crate) fn candidate_bytes(&self) -> u64 {
-        if self.network { 12 * self.pixels() } else { 0 }
+    /// Bytes of what the coarse field says; 0 without it.
+    pub(crate) fn guess_bytes(&self) -> u64 {
+        if self.sources.coarse_field { GUESS_BYTES * self.quads() } else { 0 }
+    }
+
+    fn quads(&self) -> u64 {
+        self.size.iter().map(|s| u64::from(s.div_ceil(2))).product()
+    }
+
+    /// Whether finished pixels are averaged.
+    pub(crate) fn averages(&self) -> bool {
+        self.sources.neighbours || self.network
+    }
+
+    /// The list of the tiles in which they are.
+    pub(crate) fn averages_list(&self) -> u32 {
+        if self.network { 2 } else { 1 }
     }
 
     /// Bytes of the previous frame's hits; 0 without history.
@@ -148,16 +163,25 @@ impl InfillPlan {
         if self.sources.history { 4 * self.pixels() } else { 0 }
     }
 
-    /// Bytes of the averages and, once they are used, of the network's first map.
-    pub(crate) fn shared_bytes(&self) -> u64 {
-        let averages = if self.sources.neighbours { AVERAGE_BYTES * self.levels().1 } else { 0 };
-        let map = if self.network { GROUP_BYTES * self.padded_texels(0) } else { 0 };
-        averages.max(map)
+    /// Bytes of the averages; 0 where nothing reads them.
+    pub(crate) fn average_bytes(&self) -> u64 {
+        if self.averages() { AVERAGE_BYTES * self.levels().1 } else { 0 }
     }
 
-    /// Bytes of a map of `groups` times four channels at a level, 1 for halves.
-    pub(crate) fn map_bytes(&self, level: u32, groups: u64) -> u64 {
-        if self.network { groups * GROUP_BYTES * self.padded_texels(level) } else { 0 }
+    /// Bytes of the averages spread over the holes; 0 without neighbours.
+    pub(crate) fn pulled_bytes(&self) -> u64 {
+        if self.sources.neighbours { AVERAGE_BYTES * self.quads() } else { 0 }
+    }
+
+    /// Bytes of the network's maps: of two at a half of the resolution with two groups of channels, and of two at a quarter with three,
+    /// which have room for four.
+    pub(crate) fn map_bytes(&self) -> u64 {
+        if self.network { 2 * GROUP_BYTES * self.padded_texels(1) } else { 0 }
+    }
+
+    /// See [`Self::map_bytes`].
+    pub(crate) fn quarter_bytes(&self) -> u64 {
+        if self.network { 4 * GROUP_BYTES * self.padded_texels(2) } else { 0 }
     }
 
     /// Everything together.
@@ -171,12 +195,12 @@ impl InfillPlan {
         self.tile_bytes()
             + ARGS_BYTES
             + GATE_BYTES
-            + self.candidate_bytes()
+            + self.guess_bytes()
             + self.history_bytes()
             + history
-            + self.shared_bytes()
-            + self.map_bytes(1, 2)
-            + self.map_bytes(2, 3)
+            + self.average_bytes()
+            + self.pulled_bytes()
+            + 2 * (self.map_bytes() + self.quarter_bytes())
             + weights
             + size_of::<InfillParams>() as u64
     }

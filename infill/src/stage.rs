@@ -15,7 +15,7 @@ use crate::plan::{ARGS_BYTES, GATE_BYTES, InfillPlan};
 use crate::weights::{PackedWeights, Weights};
 
 /// Rays of one workgroup of the scatter.
-const RAYS_PER_GROUP: u64 = 64;
+const RAYS_PER_GROUP: u64 = 256;
 
 /// Which filler makes the colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,16 +36,19 @@ pub struct Infill {
     tiles: Kernel,
     tile_args: Kernel,
     push: Option<Kernel>,
+    pull: Option<Kernel>,
     calibrate: Option<Kernel>,
+    guess: Option<Kernel>,
     classical: Kernel,
     network: Option<NetworkKernels>,
 }
 
 #[derive(Debug)]
 struct NetworkKernels {
-    guess: Kernel,
     encode: Kernel,
-    pairs: [Kernel; 2],
+    shrink: Kernel,
+    quarters: Kernel,
+    decode: Kernel,
     fill: Kernel,
 }
 
@@ -63,7 +66,9 @@ pub struct InfillBuffers {
     tile_lists: wgpu::BindGroup,
     tile_args: wgpu::BindGroup,
     push: Option<wgpu::BindGroup>,
+    pull: Option<wgpu::BindGroup>,
     calibrate: Option<wgpu::BindGroup>,
+    guess: Option<wgpu::BindGroup>,
     classical: wgpu::BindGroup,
     network: Option<NetworkBinds>,
     _scratch: Vec<Buffer>,
@@ -80,9 +85,10 @@ struct History {
 
 #[derive(Debug)]
 struct NetworkBinds {
-    guess: wgpu::BindGroup,
     encode: wgpu::BindGroup,
-    pairs: [wgpu::BindGroup; 2],
+    shrink: wgpu::BindGroup,
+    quarters: wgpu::BindGroup,
+    decode: wgpu::BindGroup,
     fill: wgpu::BindGroup,
 }
 
@@ -109,13 +115,16 @@ impl Infill {
             mark: make(kernels::mark()),
             tiles: make(kernels::tiles()),
             tile_args: make(kernels::tile_args()),
-            push: sources.neighbours.then(|| make(kernels::push())),
+            push: plan.averages().then(|| make(kernels::push(plan))),
+            pull: sources.neighbours.then(|| make(kernels::pull(plan))),
             calibrate: sources.coarse_field.then(|| make(kernels::calibrate(plan))),
+            guess: sources.coarse_field.then(|| make(kernels::guess(plan))),
             classical: make(kernels::fill(plan, false)),
             network: plan.network().then(|| NetworkKernels {
-                guess: make(kernels::guess(plan)),
                 encode: make(kernels::encode(plan)),
-                pairs: kernels::pairs().map(make),
+                shrink: make(kernels::shrink()),
+                quarters: make(kernels::quarters()),
+                decode: make(kernels::decode()),
                 fill: make(kernels::fill(plan, true)),
             }),
         }
@@ -127,12 +136,14 @@ impl Infill {
         let mut all =
             vec![kernels::gate(), kernels::mark(), kernels::tiles(), kernels::tile_args()];
         all.extend(sources.history.then(kernels::scatter));
-        all.extend(sources.neighbours.then(kernels::push));
+        all.extend(plan.averages().then(|| kernels::push(plan)));
+        all.extend(sources.neighbours.then(|| kernels::pull(plan)));
         all.extend(sources.coarse_field.then(|| kernels::calibrate(plan)));
+        all.extend(sources.coarse_field.then(|| kernels::guess(plan)));
         all.push(kernels::fill(plan, false));
         if plan.network() {
-            all.extend([kernels::guess(plan), kernels::encode(plan)]);
-            all.extend(kernels::pairs());
+            all.extend([kernels::encode(plan), kernels::shrink()]);
+            all.extend([kernels::quarters(), kernels::decode()]);
             all.push(kernels::fill(plan, true));
         }
         all
@@ -190,28 +201,31 @@ impl Infill {
         let over = |pass: &mut wgpu::ComputePass<'_>, kernel: &Kernel, bind, list: u32| {
             kernel.dispatch_indirect(pass, bind, &buffers.args, 16 * u64::from(list));
         };
-        if let (Some(kernel), Some(bind)) = (&self.push, &buffers.push) {
-            over(&mut begin_pass(encoder, "infill.push"), kernel, bind, 1);
+        // The last: the list of tiles.
+        let list = buffers.plan.averages_list();
+        let push = ("infill.push", &self.push, &buffers.push, list);
+        let pull = ("infill.pull", &self.pull, &buffers.pull, list);
+        let calibrate = ("infill.calibrate", &self.calibrate, &buffers.calibrate, 1);
+        let guess = ("infill.guess", &self.guess, &buffers.guess, 0);
+        for (label, kernel, bind, list) in [push, pull, calibrate, guess] {
+            if let (Some(kernel), Some(bind)) = (kernel, bind) {
+                over(&mut begin_pass(encoder, label), kernel, bind, list);
+            }
         }
-        if let (Some(kernel), Some(bind)) = (&self.calibrate, &buffers.calibrate) {
-            over(&mut begin_pass(encoder, "infill.calibrate"), kernel, bind, 1);
-        }
-        match (method, &self.network, &buffers.network) {
+        let (fill, bind) = match (method, &self.network, &buffers.network) {
             (Method::Network, Some(kernels), Some(binds)) => {
-                over(&mut begin_pass(encoder, "infill.guess"), &kernels.guess, &binds.guess, 0);
-                over(&mut begin_pass(encoder, "infill.encode"), &kernels.encode, &binds.encode, 2);
-                let labels = ["infill.halves", "infill.quarters"];
-                for ((label, kernel), bind) in labels.iter().zip(&kernels.pairs).zip(&binds.pairs) {
-                    over(&mut begin_pass(encoder, label), kernel, bind, 2);
+                let encode = ("infill.encode", &kernels.encode, &binds.encode, 2);
+                let shrink = ("infill.shrink", &kernels.shrink, &binds.shrink, 2);
+                let quarters = ("infill.quarters", &kernels.quarters, &binds.quarters, 1);
+                let decode = ("infill.decode", &kernels.decode, &binds.decode, 1);
+                for (label, kernel, bind, list) in [encode, shrink, quarters, decode] {
+                    over(&mut begin_pass(encoder, label), kernel, bind, list);
                 }
-                let mut pass = begin_pass(encoder, "infill.fill");
-                over(&mut pass, &kernels.fill, &binds.fill, 0);
+                (&kernels.fill, &binds.fill)
             }
-            _ => {
-                let mut pass = begin_pass(encoder, "infill.fill");
-                over(&mut pass, &self.classical, &buffers.classical, 0);
-            }
-        }
+            _ => (&self.classical, &buffers.classical),
+        };
+        over(&mut begin_pass(encoder, "infill.fill"), fill, bind, 0);
     }
 }
 
@@ -262,10 +276,11 @@ struct Maker<'a> {
 
 /// Memory of the network.
 struct Maps {
-    candidates: Buffer,
     weights: Buffer,
-    halves: Buffer,
+    encoded: Buffer,
+    shrunk: Buffer,
     quarters: Buffer,
+    decoded: Buffer,
 }
 
 impl Maker<'_> {
@@ -312,10 +327,10 @@ impl Maker<'_> {
         let args = self.buffer(Category::Scratch, "infill.args", ARGS_BYTES, args_usage);
         let gate_args = self.buffer(Category::Scratch, "infill.gate", GATE_BYTES, args_usage);
         let params = self.uniform("infill.params", size_of::<InfillParams>() as u64);
-        let shared = self.storage("infill.averages", plan.shared_bytes());
+        let averages = self.storage("infill.averages", plan.average_bytes());
+        let pulled = self.storage("infill.pulled", plan.pulled_bytes());
+        let guesses = self.storage("infill.guesses", plan.guess_bytes());
         let history = self.history(&params, [depth.clone(), normals.clone()]);
-        let keys = history.as_ref().map(|h| h.keys.as_entire_binding());
-
         let bind = |kernel: &Kernel, label: &str, resources: &[wgpu::BindingResource<'_>]| {
             kernel.bind(self.device, label, resources)
         };
@@ -327,59 +342,46 @@ impl Maker<'_> {
             &[
                 rays.rays().as_entire_binding(),
                 tiles.as_entire_binding(),
-                shared.as_entire_binding(),
+                averages.as_entire_binding(),
             ],
             &[depth.clone(), normals.clone()],
         ]
         .concat();
-        let calibrate = [&mark[..], &[depth, normals.clone()], &coarse_field(ranges)].concat();
-        let pixel = vec![
+        let calibrate = [&mark[..], &[depth, normals], &coarse_field(ranges)].concat();
+        let pixel = [
             rays.frame().as_entire_binding(),
             rays.shading().as_entire_binding(),
             params.as_entire_binding(),
             rays.rays().as_entire_binding(),
             tiles.as_entire_binding(),
         ];
-        let mut guesses = Vec::new();
-        guesses.extend(plan.sources().neighbours.then(|| shared.as_entire_binding()));
-        if plan.sources().coarse_field {
-            guesses.extend(coarse_field(ranges));
-        }
-        let mut fill = pixel.clone();
-        fill.push(wgpu::BindingResource::TextureView(textures.color_view()));
-        fill.extend(keys.clone());
-        let classical = [&fill[..], &guesses[..]].concat();
+        let guess = [&pixel[..], &[guesses.as_entire_binding()], &coarse_field(ranges)].concat();
+        let mut sources = Vec::new();
+        sources.extend(plan.sources().coarse_field.then(|| guesses.as_entire_binding()));
+        sources.extend(history.as_ref().map(|history| history.keys.as_entire_binding()));
+        let color = wgpu::BindingResource::TextureView(textures.color_view());
+        let mut fill = [&pixel[..], &[color], &sources[..]].concat();
+        fill.extend(plan.sources().neighbours.then(|| pulled.as_entire_binding()));
+        let known = if plan.sources().neighbours { &pulled } else { &averages };
 
         let mut scratch = Vec::new();
         let network = match &self.stage.network {
             None => None,
             Some(kernels) => {
                 let maps = self.maps(weights.ok_or(Error::NoWeights)?);
-                let candidates = maps.candidates.as_entire_binding();
-                let guess = [&pixel[..], std::slice::from_ref(&candidates), &guesses[..]].concat();
-                let mut encode = pixel.clone();
-                encode.extend([
-                    candidates.clone(),
-                    maps.weights.as_entire_binding(),
-                    shared.as_entire_binding(),
-                    normals,
-                ]);
-                encode.extend(keys);
-                let mut last = fill;
-                last.push(candidates);
-                let inputs = [&maps.weights, &shared, &maps.halves, &maps.quarters];
-                last.extend(inputs.map(|buffer| buffer.as_entire_binding()));
-                let binds = NetworkBinds {
-                    guess: bind(&kernels.guess, "infill.guess", &guess),
-                    encode: bind(&kernels.encode, "infill.encode", &encode),
-                    pairs: self.pairs(kernels, &maps, [&params, &tiles, &shared]),
-                    fill: bind(&kernels.fill, "infill.fill.network", &last),
-                };
-                scratch.extend([maps.candidates, maps.weights, maps.halves, maps.quarters]);
-                Some(binds)
+                let network = self.network(kernels, &maps, (&pixel, &sources, &fill), known);
+                scratch.extend([maps.weights, maps.encoded, maps.shrunk, maps.quarters]);
+                scratch.push(maps.decoded);
+                Some(network)
             }
         };
         let stage = self.stage;
+        let pull = [
+            params.as_entire_binding(),
+            tiles.as_entire_binding(),
+            averages.as_entire_binding(),
+            pulled.as_entire_binding(),
+        ];
         let lists = [params.as_entire_binding(), tiles.as_entire_binding()];
         let counts = [tiles.as_entire_binding(), args.as_entire_binding()];
         let gate = [
@@ -395,9 +397,11 @@ impl Maker<'_> {
             tile_lists: bind(&stage.tiles, "infill.tiles", &lists),
             tile_args: bind(&stage.tile_args, "infill.tile_args", &counts),
             push: stage.push.as_ref().map(|kernel| bind(kernel, "infill.push", &push)),
+            pull: stage.pull.as_ref().map(|kernel| bind(kernel, "infill.pull", &pull)),
             calibrate: (stage.calibrate.as_ref())
                 .map(|kernel| bind(kernel, "infill.calibrate", &calibrate)),
-            classical: bind(&stage.classical, "infill.fill.classical", &classical),
+            guess: stage.guess.as_ref().map(|kernel| bind(kernel, "infill.guess", &guess)),
+            classical: bind(&stage.classical, "infill.fill.classical", &fill),
             network,
             tiles,
             args,
@@ -406,7 +410,7 @@ impl Maker<'_> {
             history,
             _scratch: Vec::new(),
         };
-        scratch.push(shared);
+        scratch.extend([averages, pulled, guesses]);
         Ok(InfillBuffers { _scratch: scratch, ..binds })
     }
 
@@ -444,26 +448,44 @@ impl Maker<'_> {
         let bytes = bytemuck::cast_slice(&words);
         let ledger = self.ledger;
         Maps {
-            candidates: self.storage("infill.candidates", plan.candidate_bytes()),
             weights: ledger.buffer_with(self.device, category, "infill.weights", usage, bytes),
-            halves: self.storage("infill.halves", plan.map_bytes(1, 2)),
-            quarters: self.storage("infill.quarters", plan.map_bytes(2, 3)),
+            encoded: self.storage("infill.encoded", plan.map_bytes()),
+            shrunk: self.storage("infill.shrunk", plan.quarter_bytes()),
+            quarters: self.storage("infill.quarters", plan.quarter_bytes()),
+            decoded: self.storage("infill.decoded", plan.map_bytes()),
         }
     }
 
-    fn pairs(
+    /// `pixel`: what every kernel of pixels reads first. `sources`: what `lib/sources.wgsl` reads. `fill`: what the
+    /// classical filler binds. `known`: averages of the quads' finished pixels, spread over the holes if neighbours are in.
+    fn network(
         &self,
         kernels: &NetworkKernels,
         maps: &Maps,
-        [params, tiles, encoded]: [&Buffer; 3],
-    ) -> [wgpu::BindGroup; 2] {
-        let Maps { weights, halves, quarters, .. } = maps;
-        let ways = [(encoded, halves), (halves, quarters)];
-        std::array::from_fn(|i| {
-            let (finer, outputs) = ways[i];
-            let buffers = [params, tiles, weights, finer, outputs];
-            let resources = buffers.map(|b| b.as_entire_binding());
-            kernels.pairs[i].bind(self.device, "infill.pair", &resources)
-        })
+        (pixel, sources, fill): (
+            &[wgpu::BindingResource<'_>; 5],
+            &[wgpu::BindingResource<'_>],
+            &[wgpu::BindingResource<'_>],
+        ),
+        known: &Buffer,
+    ) -> NetworkBinds {
+        let [_, _, params, _, tiles] = pixel;
+        let weights = maps.weights.as_entire_binding();
+        let encode = [known, &maps.weights, &maps.encoded].map(|b| b.as_entire_binding());
+        let encode = [&pixel[..], &encode, sources].concat();
+        let convolution = |kernel: &Kernel, label: &str, maps: &[&Buffer]| {
+            let mut resources = vec![params.clone(), tiles.clone(), weights.clone()];
+            resources.extend(maps.iter().map(|map| map.as_entire_binding()));
+            kernel.bind(self.device, label, &resources)
+        };
+        let Maps { encoded, shrunk, quarters, decoded, .. } = maps;
+        let last = [fill, &[weights.clone(), decoded.as_entire_binding()]].concat();
+        NetworkBinds {
+            encode: kernels.encode.bind(self.device, "infill.encode", &encode),
+            shrink: convolution(&kernels.shrink, "infill.shrink", &[encoded, shrunk]),
+            quarters: convolution(&kernels.quarters, "infill.quarters", &[shrunk, quarters]),
+            decode: convolution(&kernels.decode, "infill.decode", &[encoded, quarters, decoded]),
+            fill: kernels.fill.bind(self.device, "infill.fill.network", &last),
+        }
     }
 }

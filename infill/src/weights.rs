@@ -31,16 +31,15 @@ impl Layer {
     }
 }
 
-/// The network's convolutions, in order: a U-Net over three resolutions, then the head.
-pub const LAYERS: [Layer; 8] = [
-    Layer::new("e0", 16, 4, 3),
-    Layer::new("e1a", 4, 8, 3),
-    Layer::new("e1b", 8, 8, 3),
-    Layer::new("e2a", 8, 12, 3),
-    Layer::new("e2b", 12, 12, 3),
-    Layer::new("d1", 20, 8, 3),
-    Layer::new("d0", 12, 4, 3),
-    Layer::new("head", 4, 6, 1),
+/// The network's layers, in order: convolutions at a half and at a quarter of the resolution and back, then those of a pixel
+/// on its own.
+pub const LAYERS: [Layer; 6] = [
+    Layer::new("e0", 16, 8, 3),
+    Layer::new("e1a", 8, 12, 3),
+    Layer::new("e1b", 12, 12, 3),
+    Layer::new("d0", 20, 8, 3),
+    Layer::new("hidden", 16, 8, 1),
+    Layer::new("head", 8, 6, 1),
 ];
 
 /// Weights of one layer.
@@ -142,10 +141,11 @@ impl Weights {
     }
 }
 
-/// Weights as the kernels read them: vectors of four halves.
+/// Weights as the kernels read them: pairs of vectors of four halves.
 ///
-/// Of a 3x3 convolution, for every group of four outputs, tap and group of four inputs, a vector of inputs for each
-/// of the outputs; then the biases. Of the head a vector for each output, then two of biases, the doubt behind them. Other channels that fill up a group are 0.
+/// For every group of four outputs, tap and group of four inputs a vector of inputs for each of the outputs, then the
+/// biases. Other channels that fill up a group, and groups of biases that fill up a pair, are 0. The doubt stands behind the last
+/// biases.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct PackedWeights {
     pub(crate) vectors: Vec<[f16; 4]>,
@@ -153,9 +153,7 @@ pub(crate) struct PackedWeights {
 
 const fn vectors(layer: Layer) -> u64 {
     let (inputs, outputs) = (layer.inputs.div_ceil(4), layer.outputs.div_ceil(4));
-    let taps = layer.taps * layer.taps;
-    let weights = if layer.taps == 1 { layer.outputs } else { 4 * outputs * taps };
-    (weights * inputs + outputs) as u64
+    ((4 * outputs * layer.taps * layer.taps) * inputs + outputs.next_multiple_of(2)) as u64
 }
 
 impl PackedWeights {
@@ -169,12 +167,13 @@ impl PackedWeights {
         bytes
     };
 
-    /// First vector of every layer.
+    /// First pair of every layer.
     pub(crate) fn first() -> [u32; LAYERS.len()] {
         let mut next = 0;
         LAYERS.map(|layer| {
-            next += vectors(layer) as u32;
-            next - vectors(layer) as u32
+            let first = next;
+            next += vectors(layer) as u32 / 2;
+            first
         })
     }
 
@@ -182,22 +181,21 @@ impl PackedWeights {
         let mut packed = Vec::new();
         for (layer, own) in LAYERS.iter().zip(&weights.layers) {
             let taps = layer.taps * layer.taps;
-            let last =
-                if layer.taps == 1 { layer.outputs } else { layer.outputs.next_multiple_of(4) };
             for group in 0..layer.outputs.div_ceil(4) {
                 for tap in 0..taps {
                     for inputs in 0..layer.inputs.div_ceil(4) {
-                        for output in 4 * group..(4 * group + 4).min(last) {
+                        for output in 4 * group..4 * group + 4 {
                             packed.push(std::array::from_fn(|i| {
                                 let input = 4 * inputs + i;
                                 let place = (output * layer.inputs + input) * taps + tap;
-                                if input < layer.inputs { own.weight[place] } else { f16::ZERO }
+                                let is_there = input < layer.inputs && output < layer.outputs;
+                                if is_there { own.weight[place] } else { f16::ZERO }
                             }));
                         }
                     }
                 }
             }
-            for group in 0..layer.outputs.div_ceil(4) {
+            for group in 0..layer.outputs.div_ceil(4).next_multiple_of(2) {
                 let bias = |i: usize| own.bias.get(4 * group + i).copied().unwrap_or(f16::ZERO);
                 packed.push(std::array::from_fn(bias));
             }
@@ -265,8 +263,8 @@ mod tests {
     }
 
     #[test]
-    fn the_network_is_as_large_as_the_study_says() {
-        assert_eq!(Weights::COUNT, 5558 + 1, "and the doubt");
+    fn the_network_is_as_large_as_the_documents_say() {
+        assert_eq!(Weights::COUNT, 4982 + 1, "and the doubt");
     }
 
     #[test]
@@ -276,17 +274,25 @@ mod tests {
         // Of the first layer: output 2, tap 5, inputs 8 to 11.
         let vector = packed.vectors[(5 * 4 + 2) * 4 + 2].map(f16::to_f32);
         assert_eq!(vector, [8.0, 9.0, 10.0, 11.0].map(|input| (2.0 * 16.0 + input) * 9.0 + 5.0));
-        let head = PackedWeights::first()[7] as usize;
-        assert_eq!(packed.vectors.len(), head + 8);
-        let doubt = f16::from_f32((5558 % 2048) as f32);
-        assert_eq!(packed.vectors[head + 7][2..], [doubt, f16::ZERO]);
+        let head = 2 * PackedWeights::first()[5] as usize;
+        assert_eq!(packed.vectors.len(), head + 18);
+        // Of the head: outputs 4 and 5 for inputs 4 to 7, then two that there are not.
+        let first = Weights::COUNT - 1 - 6 - 8 * 6;
+        let inputs = |output: usize| {
+            let input = |i| f16::from_f32(((first + 8 * output + 4 + i) % 2048) as f32);
+            std::array::from_fn(input)
+        };
+        let none = [f16::ZERO; 4];
+        assert_eq!(packed.vectors[head + 12..head + 16], [inputs(4), inputs(5), none, none]);
+        let doubt = f16::from_f32(((Weights::COUNT - 1) % 2048) as f32);
+        assert_eq!(packed.vectors[head + 17][2..], [doubt, f16::ZERO]);
     }
 
     #[test]
     fn a_file_gives_its_numbers() {
         let weights = Weights::from_safetensors(&file(|_, _, _| ())).unwrap();
         assert_eq!(weights.layer(0).weight[65].to_f32(), 65.0 / 64.0);
-        assert_eq!(weights.layer(7).bias, vec![f16::from_f32(0.5); 6]);
+        assert_eq!(weights.layer(5).bias, vec![f16::from_f32(0.5); 6]);
         assert_eq!(weights.doubt(), -2.5);
     }
 
@@ -294,7 +300,7 @@ mod tests {
     fn wrong_files_are_refused() {
         assert!(matches!(Weights::from_safetensors(b"no"), Err(Error::WeightsFile(_))));
         let shape = file(|name, shape, _| {
-            if name == "d1.weight" {
+            if name == "d0.weight" {
                 shape.swap(0, 1);
             }
         });

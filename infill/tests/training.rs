@@ -29,6 +29,7 @@ fn the_network_starts_from_the_same_shares() {
 fn the_network_reads_and_gives_as_much() {
     let count = |name| value("network.py", name).parse::<usize>().unwrap();
     assert_eq!(count("FEATURES"), infill::cpu::network::FEATURES);
+    assert_eq!(count("OWN"), infill::cpu::network::OWN);
     assert_eq!(count("OUTPUTS"), infill::cpu::network::OUTPUTS);
     let half = value("network.py", "HALF_DISTANCE").parse().unwrap();
     assert_eq!(infill::cpu::candidate::soft_distance(half), 0.5);

@@ -21,7 +21,7 @@ from safetensors.torch import load_file
 import data
 import metrics
 import shading
-from network import Network, OUTPUTS, features, mix, shown
+from network import Network, OUTPUTS, mix, shown
 from published_network import PublishedNetwork
 
 WEIGHTS = Path(__file__).parent.parent / "weights"
@@ -46,7 +46,7 @@ class Mixture:
     def __call__(self, frame):
         frame = data.without(frame, self.left_out)
         if self.network:
-            outputs, doubt = self.network(features(frame)), self.network.doubt
+            outputs, doubt = self.network(frame), self.network.doubt
         else:
             outputs, doubt = torch.zeros(1, OUTPUTS, *frame["c"].shape[1:]), 0.0
         coverage, facing = shown(frame, *mix(frame, outputs, doubt))

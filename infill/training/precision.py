@@ -18,7 +18,7 @@ import data
 import metrics
 import shading
 from evaluate import cut_group, means
-from network import Network, features, mix, shown
+from network import Network, mix, shown
 
 
 def int8(name, value):
@@ -51,10 +51,10 @@ def evaluate(folder, path):
     of, rows = networks(path), defaultdict(list)
     for record in data.records(folder):
         frame = data.as_frame(data.load(Path(folder) / record["file"])[None])
-        inputs, holes = features(frame), frame["finished"][0] == 0
+        holes = frame["finished"][0] == 0
         truth = shading.picture(frame["truth_c"], frame["truth_nv"], shading.PUBLISHED)
         for precision, network in of.items():
-            filled = shown(frame, *mix(frame, network(inputs), network.doubt))
+            filled = shown(frame, *mix(frame, network(frame), network.doubt))
             picture = shading.picture(*filled, shading.PUBLISHED).clamp(0, 1)
             row = {"psnr": metrics.psnr(picture[0], truth[0]), "psnr_holes": metrics.psnr(picture[0], truth[0], holes)}
             rows[precision, record["volume"], cut_group(record)].append(row)

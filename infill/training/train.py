@@ -15,7 +15,7 @@ from safetensors.torch import save_file
 import data
 import metrics
 import shading
-from network import DOUBT, Network, PRIOR, features, mix, shown
+from network import DOUBT, Network, PRIOR, mix, shown
 
 CROP = 128
 # Places tried per crop; the one is taken with a chance that grows with its holes.
@@ -45,7 +45,8 @@ def random_crop(frames, rng):
         crops = []
         for _ in range(TRIES):
             frame = frames[rng.integers(len(frames))]
-            y, x = (rng.integers(size - CROP + 1) for size in frame.shape[1:])
+            # Quads stay together.
+            y, x = (2 * rng.integers((size - CROP) // 2 + 1) for size in frame.shape[1:])
             crops.append(frame[:, y : y + CROP, x : x + CROP])
         holes = np.array([(crop[0] == 0).mean() for crop in crops])
         if holes.max() >= LEAST_HOLES:
@@ -71,8 +72,7 @@ def drop_sources(frame, rng):
 
 
 def loss_of(network, frame, colors, start):
-    outputs = network(features(frame).to(memory_format=torch.channels_last))
-    raw = mix(frame, outputs, start[4] - DOUBT, start[:4])
+    raw = mix(frame, network(frame), start[4] - DOUBT, start[:4])
     coverage, facing = shown(frame, *raw)
     picture = shading.picture(coverage, facing, colors)
     truth = shading.picture(frame["truth_c"], frame["truth_nv"], colors)

@@ -19,7 +19,7 @@ use wavefront::{FrameParams, LookAhead, ShadingParams};
 use crate::suite::random::Random;
 use crate::support::{self, Gpu, Scene, options};
 
-const SIZE: [u32; 2] = [150, 110];
+const SIZE: [u32; 2] = [151, 109];
 
 fn with_infill(infill: InfillOptions) -> RendererOptions {
     RendererOptions { infill: Some(infill), ..options(SIZE) }

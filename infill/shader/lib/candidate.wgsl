@@ -53,3 +53,8 @@ fn candidate_unpack(word: u32) -> Candidate {
 fn candidate_facing(candidate: Candidate, to_viewer: vec3<f32>) -> f32 {
     return clamp(dot(candidate.normal, to_viewer), 0.0, 1.0);
 }
+
+// Coverage, coverage times N.V.
+fn candidate_pair(candidate: Candidate, to_viewer: vec3<f32>) -> vec2<f32> {
+    return candidate.coverage * vec2<f32>(1.0, candidate_facing(candidate, to_viewer));
+}

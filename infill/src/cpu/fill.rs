@@ -1,4 +1,4 @@
-//! Twin of `shader/lib/guesses.wgsl`, `lib/sources.wgsl` and `shader/fill.wgsl`: from a picture with holes to a filled one.
+//! Twin of `shader/guess.wgsl`, `lib/sources.wgsl` and `shader/fill.wgsl`: from a picture with holes to a filled one.
 
 use macrocell::Grid;
 use wavefront::cpu::frame::FrameRay;
@@ -6,9 +6,10 @@ use wavefront::cpu::shading::{self, dot};
 use wavefront::{FrameParams, ShadingParams};
 
 use super::candidate::{Candidate, Packed};
+use super::features;
 use super::field::CoarseField;
 use super::march::march;
-use super::network::{FEATURES, Map, OUTPUTS, network};
+use super::network::{Map, OUTPUTS, head, network};
 use super::push_pull::{Average, Pyramid};
 use super::reproject;
 use crate::options::{DOUBT, PRIOR, Sources};
@@ -70,7 +71,24 @@ impl Scene<'_> {
         (pixel[0] + self.size()[0] * pixel[1]) as usize
     }
 
-    fn average(&self, pixel: [u32; 2]) -> Average {
+    pub(super) fn is_hole(&self, pixel: [u32; 2]) -> bool {
+        self.pixels[self.index(pixel)].is_none()
+    }
+
+    /// The pixels of a quad of 2x2 that lie in the picture, row by row.
+    pub(super) fn quad_pixels(&self, quad: [u32; 2]) -> impl Iterator<Item = [u32; 2]> {
+        let size = self.size();
+        (0..4)
+            .map(move |i| [2 * quad[0] + i % 2, 2 * quad[1] + i / 2])
+            .filter(move |p| p[0] < size[0] && p[1] < size[1])
+    }
+
+    /// The pixel whose ray goes through the coarse field for all holes of its quad.
+    pub(super) fn first_hole(&self, quad: [u32; 2]) -> Option<[u32; 2]> {
+        self.quad_pixels(quad).find(|&pixel| self.is_hole(pixel))
+    }
+
+    pub(super) fn average(&self, pixel: [u32; 2]) -> Average {
         match self.pixels[self.index(pixel)] {
             None => Average::default(),
             Some(Finished::Background) => Average { weight: 1.0, ..Average::default() },
@@ -109,6 +127,10 @@ impl Scene<'_> {
             );
         let miss = Candidate { coverage: 0.0, normal: [0.0; 3], distance: 0.0 };
         let coarse = surroundings.field.map(|(field, share)| {
+            let first = self.first_hole(pixel.map(|p| p / 2)).unwrap_or(pixel);
+            let ray = &FrameRay::new(self.frame, first).ray;
+            let to_viewer = shading::to_viewer(self.shading, ray.direction);
+            let t_low = self.t_low[self.index(first)];
             march(&self.grid, field, ray, t_low, self.frame.isovalue(), share).map(|hit| {
                 hit.map_or(miss, |hit| Candidate {
                     coverage: 1.0,
@@ -124,24 +146,11 @@ impl Scene<'_> {
     }
 }
 
-/// The network's inputs at a finished pixel, from its coverage and N.V.
-pub fn finished_features(coverage: f32, facing: f32) -> [f32; FEATURES] {
-    let (c, cn) = (coverage, coverage * facing);
-    [1.0, c, cn, c, cn, c, cn, c, cn, 1.0, c, cn, 0.0, 0.0, 0.0, 0.0]
-}
-
-/// The network's inputs at a hole.
-pub fn features(candidates: &[Packed; 4], to_viewer: [f32; 3]) -> [f32; FEATURES] {
-    let mut features = [0.0; FEATURES];
-    for (i, candidate) in candidates.iter().enumerate() {
-        let first = 3 + 2 * i + usize::from(i == 3);
-        features[first] = candidate.coverage;
-        features[first + 1] = candidate.coverage * candidate.facing(to_viewer);
+impl Surroundings<'_> {
+    /// What they say about a quad.
+    pub(super) fn quad(&self, quad: [u32; 2]) -> Option<Average> {
+        self.pyramid.as_ref().map(|pyramid| pyramid.quad(quad))
     }
-    features[9] = f32::from(u8::from(candidates[3].valid));
-    // Coarse field, its thin variant, neighbours, history.
-    features[12..].copy_from_slice(&[1, 2, 0, 3].map(|i: usize| candidates[i].soft_distance));
-    features
 }
 
 /// A filled pixel.
@@ -165,7 +174,7 @@ fn perpendicular(v: [f32; 3]) -> [f32; 3] {
 /// `None` without any candidate.
 pub fn mix(
     candidates: &[Packed; 4],
-    output: &[f32],
+    output: &[f32; OUTPUTS],
     doubt: f32,
     to_viewer: [f32; 3],
 ) -> Option<Filled> {
@@ -207,8 +216,8 @@ pub fn mix(
 pub struct Fill {
     /// Holes: what fills them. `None` for finished pixels and holes without a candidate.
     pub pixels: Vec<Option<Filled>>,
-    /// What the network gave, at the size padded to multiples of 4.
-    pub outputs: Map,
+    /// What the head read of the network at a half of the size padded to multiples of 4.
+    pub map: Map,
 }
 
 impl Scene<'_> {
@@ -217,42 +226,23 @@ impl Scene<'_> {
         let size = self.size();
         let surroundings = self.surroundings();
         let all = || (0..size[0] * size[1]).map(|i| [i % size[0], i / size[0]]);
-        let to_viewer = |pixel| {
-            shading::to_viewer(self.shading, FrameRay::new(self.frame, pixel).ray.direction)
-        };
         let packed: Vec<Option<[Packed; 4]>> = all()
-            .zip(self.pixels)
-            .map(|(pixel, finished)| {
-                let hole = finished.is_none();
-                hole.then(|| {
+            .map(|pixel| {
+                self.is_hole(pixel).then(|| {
                     let candidates = self.candidates(&surroundings, pixel);
                     candidates.map(|c| Candidate::unpack(Candidate::pack(c)))
                 })
             })
             .collect();
-        let padded = size.map(|s| s.next_multiple_of(4) as usize);
-        let mut inputs = Map::zero(padded, FEATURES);
-        for (pixel, candidates) in all().zip(&packed) {
-            let viewer = to_viewer(pixel);
-            let values = match (candidates, self.pixels[self.index(pixel)]) {
-                (Some(candidates), _) => features(candidates, viewer),
-                (None, Some(Finished::Hit { normal, .. })) => {
-                    finished_features(1.0, dot(normal, viewer).clamp(0.0, 1.0))
-                }
-                (None, _) => finished_features(0.0, 0.0),
-            };
-            let first = (pixel[0] as usize + padded[0] * pixel[1] as usize) * FEATURES;
-            inputs.values[first..first + FEATURES].copy_from_slice(&values);
-        }
-        let outputs = network(weights, &inputs);
-        debug_assert_eq!(outputs.channels, OUTPUTS);
-        let pixels = all()
-            .zip(&packed)
-            .map(|(pixel, candidates)| {
-                let output = outputs.texel(pixel[0] as usize, pixel[1] as usize);
-                candidates.as_ref().and_then(|c| mix(c, output, weights.doubt(), to_viewer(pixel)))
-            })
-            .collect();
-        Fill { pixels, outputs }
+        let map = network(weights, &self.features(&surroundings, &packed));
+        let fill = |(pixel, candidates): ([u32; 2], &Option<[Packed; 4]>)| {
+            let candidates = candidates.as_ref()?;
+            let ray = FrameRay::new(self.frame, pixel).ray;
+            let to_viewer = shading::to_viewer(self.shading, ray.direction);
+            let own = features::own(candidates, to_viewer);
+            let output = head(weights, &map, pixel.map(|p| p as usize), own);
+            mix(candidates, &output, weights.doubt(), to_viewer)
+        };
+        Fill { pixels: all().zip(&packed).map(fill).collect(), map }
     }
 }

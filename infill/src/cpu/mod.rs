@@ -2,6 +2,7 @@
 
 mod calibrate;
 pub mod candidate;
+pub mod features;
 pub mod field;
 pub mod fill;
 pub mod march;
@@ -12,4 +13,4 @@ pub mod push_pull;
 pub mod reproject;
 
 pub use candidate::Candidate;
-pub use fill::{Fill, Finished, Scene, features};
+pub use fill::{Fill, Finished, Scene};

@@ -1,11 +1,15 @@
-//! Twin of the network's kernels: dense convolutions over a whole picture, with the same roundings to f16.
+//! Twin of the network's kernels: dense convolutions over a whole picture, with the same roundings to f16, and the head of
+//! a pixel.
 
 use half::f16;
 
 use crate::weights::{LAYERS, Weights};
 
-/// Channels that the network reads at every pixel; [`super::features`] says what they are.
+/// Channels that the network reads at every quad of 2x2 pixels; [`super::features`] says what they are.
 pub const FEATURES: usize = 16;
+
+/// Numbers that the head reads of a pixel's own candidates: coverage and coverage N.V of each.
+pub const OWN: usize = 8;
 
 /// Numbers that the network gives for every pixel: logits of the candidates in the order of [`crate::Source`],
 /// then residuals of coverage and N.V.
@@ -58,25 +62,31 @@ impl Map {
         map
     }
 
-    /// Bilinear interpolation at twice the size, clamped at the edges.
+    /// Bilinear interpolation at a texel of twice the size, clamped at the edges: the channels.
+    fn interpolated(&self, finer: [usize; 2]) -> impl Iterator<Item = f32> + '_ {
+        let place: [[(usize, f32); 2]; 2] = std::array::from_fn(|a| {
+            let upper = finer[a].div_ceil(2);
+            let share = if finer[a].is_multiple_of(2) { 0.75 } else { 0.25 };
+            let last = self.size[a] - 1;
+            [(upper.saturating_sub(1), 1.0 - share), (upper.min(last), share)]
+        });
+        (0..self.channels).map(move |c| {
+            let row = |y: usize| {
+                let [(x0, w0), (x1, w1)] = place[0];
+                self.texel(x0, y)[c] * w0 + self.texel(x1, y)[c] * w1
+            };
+            let [(y0, w0), (y1, w1)] = place[1];
+            row(y0) * w0 + row(y1) * w1
+        })
+    }
+
+    /// The map at twice the size.
     fn enlarged(&self) -> Self {
         let mut map = Self::zero(self.size.map(|s| 2 * s), self.channels);
         for y in 0..map.size[1] {
             for x in 0..map.size[0] {
-                let place: [[(usize, f32); 2]; 2] = std::array::from_fn(|a| {
-                    let finer = [x, y][a];
-                    let upper = finer.div_ceil(2);
-                    let share = if finer.is_multiple_of(2) { 0.75 } else { 0.25 };
-                    let last = self.size[a] - 1;
-                    [(upper.saturating_sub(1), 1.0 - share), (upper.min(last), share)]
-                });
-                for c in 0..self.channels {
-                    let row = |y: usize| {
-                        let [(x0, w0), (x1, w1)] = place[0];
-                        self.texel(x0, y)[c] * w0 + self.texel(x1, y)[c] * w1
-                    };
-                    let [(y0, w0), (y1, w1)] = place[1];
-                    map.texel_mut(x, y)[c] = half(row(y0) * w0 + row(y1) * w1);
+                for (to, from) in map.texel_mut(x, y).iter_mut().zip(self.interpolated([x, y])) {
+                    *to = half(from);
                 }
             }
         }
@@ -134,15 +144,33 @@ impl Map {
     }
 }
 
-/// The network on a picture's features, whose width and height are multiples of 4.
+/// The convolutions on the features of a picture's quads, whose width and height are even: what the head reads at a half of
+/// the picture's resolution.
 pub fn network(weights: &Weights, features: &Map) -> Map {
     let layer = |map: &Map, index: usize| map.convolved(weights, index).activated();
     let mut rounded = features.clone();
     rounded.values.iter_mut().for_each(|v| *v = half(*v));
     let e0 = layer(&rounded, 0);
     let e1 = layer(&layer(&e0.pooled(), 1), 2);
-    let e2 = layer(&layer(&e1.pooled(), 3), 4);
-    let d1 = layer(&e1.joined(&e2.enlarged()), 5);
-    let d0 = layer(&e0.joined(&d1.enlarged()), 6);
-    d0.convolved(weights, 7)
+    layer(&e0.joined(&e1.enlarged()), 3)
+}
+
+/// What the network says about a pixel: from the map of [`network`] and the pixel's own candidates.
+pub fn head(weights: &Weights, map: &Map, pixel: [usize; 2], own: [f32; OWN]) -> [f32; OUTPUTS] {
+    let read: Vec<f32> = map.interpolated(pixel).chain(own).collect();
+    let mut hidden = dense(weights, 4, &read);
+    hidden.iter_mut().for_each(|v| *v = v.max(0.0));
+    let outputs = dense(weights, 5, &hidden);
+    std::array::from_fn(|i| outputs[i])
+}
+
+/// A layer without neighbours at one pixel.
+fn dense(weights: &Weights, index: usize, inputs: &[f32]) -> Vec<f32> {
+    let own = weights.layer(index);
+    let rows = own.weight.chunks_exact(inputs.len()).zip(&own.bias);
+    rows.map(|(row, bias)| {
+        let products = row.iter().zip(inputs).map(|(w, v)| w.to_f32() * v);
+        bias.to_f32() + products.sum::<f32>()
+    })
+    .collect()
 }

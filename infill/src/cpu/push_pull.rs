@@ -108,6 +108,12 @@ impl Pyramid {
         Self { levels }
     }
 
+    /// What is known about a quad of 2x2 pixels, or the surroundings say where nothing is.
+    pub fn quad(&self, quad: [u32; 2]) -> Average {
+        let level = &self.levels[0];
+        level.texels[quad[0] as usize + level.size[0] * quad[1] as usize]
+    }
+
     /// What the surroundings say about an unfinished pixel.
     pub fn at(&self, pixel: [u32; 2]) -> Average {
         self.levels[0].pulled(pixel.map(|p| p as usize))
