@@ -138,6 +138,26 @@ fn only_the_first_pass_of_a_frame_looks_ahead_less() {
 }
 
 #[test]
+fn passes_after_the_first_decode_ahead_again() {
+    let (gpu, scene) = (Gpu::new(), Scene::generated("turbulence", [45, 41, 38], 8.0));
+    let decoded = |look_ahead: u32| {
+        let mut renderer = gpu.renderer(&scene, held(BudgetMode::Predicted, Residency::Cached));
+        let frames = (0..4).map(|number| {
+            // As above; the first frames are what is learned from.
+            renderer.clear_cache();
+            let mut frame = frame(&scene, 20.0 + 5.0 * f64::from(number), Some(1e-3));
+            frame.options.look_ahead = look_ahead;
+            renderer.set_frame(&frame).unwrap();
+            let (device, queue) = (&gpu.device, &gpu.queue);
+            renderer.render_to_completion(device, queue, |_, _| true).unwrap().blocks_decoded
+        });
+        frames.skip(2).sum::<u32>()
+    };
+    let (ahead, not) = (decoded(8), decoded(1));
+    assert!(ahead > not + not / 20, "{ahead} blocks decoded, {not} without looking ahead");
+}
+
+#[test]
 fn times_are_predicted_once_something_was_measured() {
     let (gpu, scene) = (Gpu::new(), Scene::generated("turbulence", [45, 41, 38], 8.0));
     let mut renderer = gpu.renderer(&scene, held(BudgetMode::Predicted, Residency::Full));
