@@ -47,12 +47,28 @@ fn neighbours(pixel: vec2<u32>, to_viewer: vec3<f32>) -> u32 {
     return CANDIDATE_NONE;
 }
 
-fn hints(pixel: vec2<u32>, found: array<Candidate, 4>, to_viewer: vec3<f32>) -> MixHints {
+// What a loop over pixels reads of uniforms and weights, loaded once.
+struct FillLoop {
+    lines: FrameRays,
+#ifdef NETWORK
+    head: array<vec4<u32>, HEAD_VECTORS>,
+#endif
+}
+
+fn fill_loop() -> FillLoop {
+#ifdef NETWORK
+    return FillLoop(frame_rays(frame), head_weights());
+#else
+    return FillLoop(frame_rays(frame));
+#endif
+}
+
+fn hints(loaded: FillLoop, pixel: vec2<u32>, found: array<Candidate, 4>, to_viewer: vec3<f32>) -> MixHints {
 #ifdef NETWORK
     let own = mat2x4<f32>(
         vec4<f32>(candidate_pair(found[0], to_viewer), candidate_pair(found[1], to_viewer)),
         vec4<f32>(candidate_pair(found[2], to_viewer), candidate_pair(found[3], to_viewer)));
-    let network = head_outputs(pixel, own);
+    let network = head_outputs(loaded.head, pixel, own);
     return MixHints(network[0], network[1].xy, network[1].z);
 #else
     // Loaded, so that the mixture is computed as with a network of zeros.
@@ -60,8 +76,8 @@ fn hints(pixel: vec2<u32>, found: array<Candidate, 4>, to_viewer: vec3<f32>) -> 
 #endif
 }
 
-fn fill(pixel: vec2<u32>) -> bool {
-    let ray = frame_ray(frame, pixel).ray;
+fn fill(loaded: FillLoop, pixel: vec2<u32>) -> bool {
+    let ray = frame_ray_of(loaded.lines, pixel).ray;
     let to_viewer = shading_to_viewer(ray.direction);
     let coarse = sources_coarse(pixel / 2u);
     let found = array<Candidate, 4>(
@@ -70,7 +86,7 @@ fn fill(pixel: vec2<u32>) -> bool {
         candidate_unpack(coarse.y),
         candidate_unpack(sources_history(sources_key(pixel), ray, frame_number(frame, pixel))),
     );
-    let mixed = mix_candidates(found, hints(pixel, found, to_viewer), to_viewer);
+    let mixed = mix_candidates(found, hints(loaded, pixel, found, to_viewer), to_viewer);
     var color = shading.unfinished;
     if (mixed.filled) {
         let coverage = select(mixed.coverage, step(0.5, mixed.coverage), params.crisp != 0u);
@@ -96,9 +112,10 @@ fn main(
     let word = infill_list_word(params, LIST, select(0u, index, listed));
     let corner = infill_tile_corner(params, atomicLoad(&tiles[word]));
     let count = holes_collect(corner, listed, lane);
+    let loaded = fill_loop();
     var filled = 0u;
     for (var i = lane; i < count; i += LANES) {
-        filled += u32(fill(corner + holes_place(i, count)));
+        filled += u32(fill(loaded, corner + holes_place(i, count)));
     }
     atomicAdd(&filled_count, filled);
     workgroupBarrier();

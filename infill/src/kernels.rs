@@ -240,8 +240,7 @@ pub(crate) fn fill(plan: &InfillPlan, network: bool) -> KernelSource {
         bindings.push(VECTORS);
     }
     if network {
-        constants.push(("HIDDEN_WEIGHTS", weights(4)));
-        constants.push(("HEAD_WEIGHTS", weights(5)));
+        constants.push(("HEAD_WEIGHTS", weights(4)));
         constants.push(("NETWORK", Constant::Bool(true)));
         constants.push(("NETWORK_BINDING", next(&bindings)));
         bindings.extend([VECTORS; 2]);

@@ -19,10 +19,12 @@ fn conv_column(w: mat4x4<f32>, value: vec4<f32>) -> vec4<f32> {
 }
 
 // Four inputs of each of four outputs.
-fn conv_matrix(first: u32) -> mat4x4<f32> {
-    let low = weights[first];
-    let high = weights[first + 1u];
+fn conv_matrix_of(low: vec4<u32>, high: vec4<u32>) -> mat4x4<f32> {
     return mat4x4<f32>(conv_unpack(low.xy), conv_unpack(low.zw), conv_unpack(high.xy), conv_unpack(high.zw));
+}
+
+fn conv_matrix(first: u32) -> mat4x4<f32> {
+    return conv_matrix_of(weights[first], weights[first + 1u]);
 }
 
 // A group of biases, the first of which are at `first`.
