@@ -20,6 +20,9 @@ fn every_mode_shows_the_same_recording() {
         let [rmse, above, below] =
             ["rmse_ms", "rmse_above_ms", "rmse_below_ms"].map(|key| number(row, key));
         assert!(rmse <= above.max(below) + 1e-9, "{row}");
+        let share = number(row, "frames_above") / number(row, "frames");
+        let excess = above * share.sqrt();
+        assert!((number(row, "excess_ms") - excess).abs() < 1e-6 * (1.0 + excess), "{row}");
         assert!(number(row, "largest_above_ms") >= above - 1e-9, "{row}");
         assert!(number(row, "largest_below_ms") >= below - 1e-9, "{row}");
         assert!(number(row, "most_budget_ms") >= number(row, "budget_ms"), "{row}");

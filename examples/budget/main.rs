@@ -175,6 +175,8 @@ fn table(rows: &[Row]) -> String {
         "s",
         "target",
         "quality",
+        "frames above",
+        "excess",
         "RMSE above",
         "RMSE below",
         "RMSE",
@@ -193,6 +195,8 @@ fn table(rows: &[Row]) -> String {
             row.seconds.to_string(),
             ms(row.target_ms),
             format!("{:.2}", row.quality),
+            row.frames_above.to_string(),
+            ms(row.excess_ms),
             ms(row.rmse_above_ms),
             ms(row.rmse_below_ms),
             ms(row.rmse_ms),
@@ -208,7 +212,15 @@ fn table(rows: &[Row]) -> String {
 
 /// Every mode against last-frame adaptation, means over volumes and recordings.
 fn summary(rows: &[Row]) -> String {
-    let heads = ["mode", "RMSE above", "largest above", "quality", "prediction error"];
+    let heads = [
+        "mode",
+        "RMSE above",
+        "excess over all frames",
+        "frames above",
+        "largest above",
+        "quality",
+        "prediction error",
+    ];
     let mut table = Table::new("Against the last frame's time", &heads, 1);
     let mean = |mode: &str, value: fn(&Row) -> f64| {
         let own: Vec<f64> = rows.iter().filter(|row| row.mode == mode).map(value).collect();
@@ -222,6 +234,8 @@ fn summary(rows: &[Row]) -> String {
         table.line(&[
             mode.into(),
             share(|row| row.rmse_above_ms / row.target_ms),
+            share(|row| row.excess_ms / row.target_ms),
+            share(|row| row.frames_above as f64 / row.frames as f64),
             share(|row| row.largest_above_ms / row.target_ms),
             share(|row| row.quality),
             format!("{:.0} %", 100.0 * mean(mode, |row| row.prediction_error.unwrap_or(f64::NAN))),

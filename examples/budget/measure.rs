@@ -43,6 +43,9 @@ pub struct Row {
     /// Mean finished share of the rays that enter the volume.
     pub quality: f64,
     pub rmse_ms: f64,
+    pub frames_above: usize,
+    /// Over all frames: what each took longer than the target, 0 for those that did not.
+    pub excess_ms: f64,
     /// Over the frames above and below the target.
     pub rmse_above_ms: f64,
     pub rmse_below_ms: f64,
@@ -199,6 +202,8 @@ impl Row {
             frames: shown.len(),
             quality: mean(|shown| shown.quality),
             rmse_ms: rms(errors().collect()),
+            frames_above: errors().filter(|e| *e > 0.0).count(),
+            excess_ms: rms(errors().map(|e| e.max(0.0)).collect()),
             rmse_above_ms: rms(errors().filter(|e| *e > 0.0).collect()),
             rmse_below_ms: rms(errors().filter(|e| *e <= 0.0).collect()),
             largest_above_ms: errors().fold(0.0, f64::max),
