@@ -1,7 +1,5 @@
 // The network from the quarters back to the halves, over the tiles with holes and their neighbours.
-#import infill_params
 #import conv
-#import indirect
 
 @group(0) @binding(0) var<uniform> params: InfillParams;
 @group(0) @binding(1) var<storage, read> tiles: array<u32>;
@@ -12,10 +10,8 @@
 
 const LIST: u32 = 1u;
 const SCALE: u32 = 2u; // pixels to a texel
-const EDGE: u32 = INFILL_TILE / SCALE;
-const HALO: u32 = EDGE + 2u;
 const LAYER: ConvLayer = ConvLayer(WEIGHTS, 5u, 2u);
-const CONV_MEMORY: u32 = 3u * HALO * HALO;
+const CONV_PAIRS: u32 = 3u;
 
 // Two groups of the quarters, interpolated at a texel of the halves.
 fn enlarged(place: ConvPlace, width: u32, pair: u32) -> vec4<u32> {
@@ -26,31 +22,21 @@ fn enlarged(place: ConvPlace, width: u32, pair: u32) -> vec4<u32> {
     return conv_pack_pair(mixed.low, mixed.high);
 }
 
+// Own channels, then those of the quarters.
+fn inputs_at(texel: vec2<u32>, size: vec2<u32>) -> array<vec4<u32>, CONV_PAIRS> {
+    let place = conv_enlarged(vec2<i32>(texel), size / 2u);
+    return array<vec4<u32>, CONV_PAIRS>(
+        encoded[texel.x + size.x * texel.y],
+        enlarged(place, size.x / 2u, 0u),
+        enlarged(place, size.x / 2u, 1u),
+    );
+}
+
 @compute @workgroup_size(CONV_LANES)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let index = indirect_linear_group(group, groups);
-    let listed = index < tiles[LIST];
-    let tile = tiles[infill_list_word(params, LIST, select(0u, index, listed))];
-    let corner = infill_tile_corner(params, tile) / SCALE;
-    let size = params.padded / SCALE;
-    for (var i = lane; i < HALO * HALO; i += CONV_LANES) {
-        let texel = vec2<i32>(corner + vec2<u32>(i % HALO, i / HALO)) - vec2<i32>(1);
-        let inside = conv_inside(texel, size);
-        // Own channels, then those of the quarters.
-        for (var pair = 0u; pair < 3u; pair++) {
-            conv_memory[3u * i + pair] = vec4<u32>(0u);
-        }
-        if (inside) {
-            let place = conv_enlarged(texel, size / 2u);
-            conv_memory[3u * i] = encoded[u32(texel.x) + size.x * u32(texel.y)];
-            conv_memory[3u * i + 1u] = enlarged(place, size.x / 2u, 0u);
-            conv_memory[3u * i + 2u] = enlarged(place, size.x / 2u, 1u);
-        }
-    }
-    workgroupBarrier();
-    conv_tile(LAYER, ConvTile(corner, EDGE, size), listed, lane);
+    conv_layer(listed_tile(group, groups), lane);
 }

@@ -3,7 +3,6 @@
 #import average
 #import conv
 #import shading
-#import indirect
 
 @group(0) @binding(0) var<uniform> frame: FrameParams;
 @group(0) @binding(1) var<uniform> shading: ShadingParams;
@@ -21,10 +20,9 @@
 #endif
 
 const LIST: u32 = 2u;
-const EDGE: u32 = INFILL_TILE / 2u; // quads of a tile
-const HALO: u32 = EDGE + 2u;
+const SCALE: u32 = 2u; // a texel is a quad
 const LAYER: ConvLayer = ConvLayer(WEIGHTS, 4u, 2u);
-const CONV_MEMORY: u32 = 2u * HALO * HALO;
+const CONV_PAIRS: u32 = 2u;
 
 // What is said about a quad beside its finished pixels.
 struct Guessed {
@@ -71,12 +69,12 @@ fn guessed(quad: vec2<u32>, holes: u32, average: Average, ray: DdaRay, to_viewer
 
 // What the network reads of a quad, in groups of four: the share that is finished, that times its coverage and coverage N.V; the same
 // two of every candidate for what is holes; whether history has one; soft distances.
-fn features_at(quad: vec2<u32>, lines: FrameRays) -> array<vec4<f32>, 4> {
+fn features_at(quad: vec2<u32>) -> array<vec4<f32>, 4> {
     let holes = quad_holes(quad);
     let inside = min(params.size - 2u * quad, vec2<u32>(2u));
     let hole_share = 0.25 * f32(countOneBits(holes));
     let done = 0.25 * f32(inside.x * inside.y) - hole_share;
-    let ray = frame_ray_of(lines, 2u * quad + quad_first_hole(holes)).ray;
+    let ray = frame_ray(frame, 2u * quad + quad_first_hole(holes)).ray;
     let to_viewer = shading_to_viewer(ray.direction);
     // Of the finished pixels, if there are any.
     let average = average_unpack(known[quad_index(quad)]);
@@ -101,25 +99,21 @@ fn features_at(quad: vec2<u32>, lines: FrameRays) -> array<vec4<f32>, 4> {
     );
 }
 
+// Nothing where the map is padded beyond the picture.
+fn inputs_at(quad: vec2<u32>, size: vec2<u32>) -> array<vec4<u32>, CONV_PAIRS> {
+    var features = array<vec4<f32>, 4>();
+    if (all(2u * quad < params.size)) {
+        features = features_at(quad);
+    }
+    return array<vec4<u32>, CONV_PAIRS>(
+        conv_pack_pair(features[0], features[1]), conv_pack_pair(features[2], features[3]));
+}
+
 @compute @workgroup_size(CONV_LANES)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let index = indirect_linear_group(group, groups);
-    let listed = index < tiles[LIST];
-    let corner = infill_tile_corner(params, tiles[infill_list_word(params, LIST, select(0u, index, listed))]);
-    let lines = frame_rays(frame);
-    for (var i = lane; i < HALO * HALO; i += CONV_LANES) {
-        let quad = vec2<i32>(corner / 2u + vec2<u32>(i % HALO, i / HALO)) - vec2<i32>(1);
-        var features = array<vec4<f32>, 4>();
-        if (infill_inside(params, 2 * quad)) {
-            features = features_at(vec2<u32>(quad), lines);
-        }
-        conv_memory[2u * i] = conv_pack_pair(features[0], features[1]);
-        conv_memory[2u * i + 1u] = conv_pack_pair(features[2], features[3]);
-    }
-    workgroupBarrier();
-    conv_tile(LAYER, ConvTile(corner / 2u, EDGE, params.padded / 2u), listed, lane);
+    conv_layer(listed_tile(group, groups), lane);
 }

@@ -5,7 +5,7 @@
 #import shading
 #import quads
 #import tile_rays
-#import indirect
+#import listed_tile
 
 @group(0) @binding(0) var<uniform> frame: FrameParams;
 @group(0) @binding(1) var<uniform> shading: ShadingParams;
@@ -73,13 +73,11 @@ fn main(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let index = indirect_linear_group(group, groups);
-    let listed = index < tiles[LIST];
-    let corner = infill_tile_corner(params, tiles[infill_list_word(params, LIST, select(0u, index, listed))]);
-    if (lane >= collect(corner, listed, lane)) {
+    let tile = listed_tile(group, groups);
+    if (lane >= collect(tile.corner, tile.listed, lane)) {
         return;
     }
-    let quad = corner / 2u + frame_place(collected[lane] & 255u);
+    let quad = tile.corner / 2u + frame_place(collected[lane] & 255u);
     let pixel = 2u * quad + quad_first_hole(collected[lane] >> 8u);
     let share = infill_share(tiles[TILES_SHARES], tiles[TILES_SAMPLES]);
     guesses[quad_index(quad)] = guess(pixel, share);

@@ -1,8 +1,7 @@
 // The averages spread over the holes, from the coarsest level down to the quads of 2x2 pixels. A workgroup for every tile of LIST, an
 // invocation for a quad.
-#import infill_params
 #import average
-#import indirect
+#import listed_tile
 
 @group(0) @binding(0) var<uniform> params: InfillParams;
 @group(0) @binding(1) var<storage, read> tiles: array<u32>;
@@ -60,23 +59,21 @@ fn main(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let index = indirect_linear_group(group, groups);
-    let listed = index < tiles[LIST];
-    let corner = infill_tile_corner(params, tiles[infill_list_word(params, LIST, select(0u, index, listed))]);
+    let tile = listed_tile(group, groups);
     for (var level = 3u; level > 0u; level--) {
         let edge = edge_of(level);
         if (lane < edge * edge) {
             // Exact for so few texels; an integer division is slow.
             let row = u32((f32(lane) + 0.5) / f32(edge));
             let place = vec2<i32>(vec2<u32>(lane - row * edge, row)) - vec2<i32>(1);
-            texels[first_of(level) + lane] = average_pack(spread(level, corner, place));
+            texels[first_of(level) + lane] = average_pack(spread(level, tile.corner, place));
         }
         workgroupBarrier();
     }
     let place = vec2<u32>(lane & 7u, lane >> 3u);
-    let quad = corner / 2u + place;
+    let quad = tile.corner / 2u + place;
     let size = size_of(0u);
-    if (listed && all(quad < size)) {
-        pulled[quad.x + size.x * quad.y] = average_pack(spread(0u, corner, vec2<i32>(place)));
+    if (tile.listed && all(quad < size)) {
+        pulled[quad.x + size.x * quad.y] = average_pack(spread(0u, tile.corner, vec2<i32>(place)));
     }
 }

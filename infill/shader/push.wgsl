@@ -1,9 +1,8 @@
 // Averages of the finished pixels, from 2x2 pixels to 16x16. A workgroup for every tile of LIST, an invocation for 2x2
 // pixels.
-#import infill_params
 #import tile_rays
 #import average
-#import indirect
+#import listed_tile
 
 @group(0) @binding(0) var<uniform> frame: FrameParams;
 @group(0) @binding(1) var<uniform> params: InfillParams;
@@ -52,22 +51,20 @@ fn main(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let index = indirect_linear_group(group, groups);
-    let listed = index < tiles[LIST];
-    let corner = infill_tile_corner(params, tiles[infill_list_word(params, LIST, select(0u, index, listed))]);
+    let tile = listed_tile(group, groups);
     let own = frame_place(lane);
-    let holes = tile_word(corner, lane >> 3u) >> (4u * (lane & 7u));
+    let holes = tile_word(tile.corner, lane >> 3u) >> (4u * (lane & 7u));
     let lines = frame_rays(frame);
     var sum = average_none();
     for (var child = 0u; child < 4u; child++) {
         if (((holes >> child) & 1u) == 0u) {
-            sum = average_plus(sum, pixel_average(corner + 2u * own + frame_place(child), lines), 1.0);
+            sum = average_plus(sum, pixel_average(tile.corner + 2u * own + frame_place(child), lines), 1.0);
         }
     }
     let first = average_limited(sum);
     keep_texel(lane, first);
-    if (listed) {
-        write(0u, corner / 2u + own, first);
+    if (tile.listed) {
+        write(0u, tile.corner / 2u + own, first);
     }
     // 8x8 texels become 4x4, 2x2, 1, each of four that follow each other.
     for (var level = 1u; level < 4u; level++) {
@@ -83,8 +80,8 @@ fn main(
         workgroupBarrier();
         if (is_texel) {
             keep_texel(lane, next);
-            if (listed) {
-                write(level, (corner >> vec2<u32>(level + 1u)) + own, next);
+            if (tile.listed) {
+                write(level, (tile.corner >> vec2<u32>(level + 1u)) + own, next);
             }
         }
     }

@@ -18,7 +18,7 @@ macro_rules! modules {
 }
 
 /// What kernels of this crate import from it.
-const LIBRARY: [Module; 16] = modules![
+const LIBRARY: [Module; 17] = modules![
     infill_params = "infill_params.wgsl",
     infill_rays = "infill_rays.wgsl",
     candidate = "candidate.wgsl",
@@ -27,6 +27,7 @@ const LIBRARY: [Module; 16] = modules![
     coarse_field = "coarse_field.wgsl",
     march = "march.wgsl",
     quads = "quads.wgsl",
+    listed_tile = "listed_tile.wgsl",
     tile_rays = "tile_rays.wgsl",
     holes = "holes.wgsl",
     history = "history.wgsl",

@@ -1,24 +1,24 @@
 // 3x3 convolutions of a tile in a workgroup's memory. Channels go in groups of four, two groups to a vector. Sums are in f32. The
-// importing text gives CONV_MEMORY (vectors) and declares
+// importing text declares `params`, `tiles` and
 //   var<storage, read> weights: array<vec4<u32>>;
 //   var<storage, read_write> outputs: array<vec2<u32>>;
+// and gives LIST, SCALE (pixels to a texel), LAYER, CONV_PAIRS (vectors of a texel's inputs) and
+//   fn inputs_at(texel: vec2<u32>, size: vec2<u32>) -> array<vec4<u32>, CONV_PAIRS>, of a texel of a map of that size.
+#import listed_tile
 #import conv_texel
 
 const CONV_LANES: u32 = 64u;
 
-var<workgroup> conv_memory: array<vec4<u32>, CONV_MEMORY>;
+// Texels of a tile, and with those around it.
+const CONV_EDGE: u32 = INFILL_TILE / SCALE;
+const CONV_HALO: u32 = CONV_EDGE + 2u;
+
+var<workgroup> conv_memory: array<vec4<u32>, CONV_PAIRS * CONV_HALO * CONV_HALO>;
 
 struct ConvLayer {
     weights: u32,    // first vector
     groups_in: u32,  // of channels
     groups_out: u32,
-}
-
-// Part of a map.
-struct ConvTile {
-    corner: vec2<u32>, // first texel
-    edge: u32,         // texels, a multiple of CONV_STRIP
-    size: vec2<u32>,   // of the map, in texels
 }
 
 // Texels in a row that an invocation makes together: each weight is unpacked once for all of them.
@@ -40,15 +40,15 @@ fn conv_row(
 }
 
 // Four outputs for a strip of texels, the first of which has its 3x3 inputs from `place` on, before the activation. The inputs lie row by
-// row, `width` texels in each. The weights: for every group of outputs, tap and group of inputs a vector of inputs for each of the
+// row. The weights: for every group of outputs, tap and group of inputs a vector of inputs for each of the
 // outputs; behind all the biases.
-fn conv_sums(layer: ConvLayer, width: u32, place: vec2<u32>, group: u32) -> mat4x4<f32> {
-    let groups = layer.groups_in;
-    let pairs = (groups + 1u) / 2u;
-    let bias = conv_bias(layer.weights + 18u * groups * layer.groups_out, group);
+fn conv_sums(place: vec2<u32>, group: u32) -> mat4x4<f32> {
+    let groups = LAYER.groups_in;
+    let pairs = CONV_PAIRS;
+    let bias = conv_bias(LAYER.weights + 18u * groups * LAYER.groups_out, group);
     var sums = mat4x4<f32>(bias, bias, bias, bias);
-    var row_weight = layer.weights + 18u * groups * group;
-    var row = (place.x + width * place.y) * pairs;
+    var row_weight = LAYER.weights + 18u * groups * group;
+    var row = (place.x + CONV_HALO * place.y) * pairs;
     for (var y = 0u; y < 3u; y++) {
         for (var pair = 0u; pair < pairs; pair++) {
             let v0 = conv_memory[row + pair];
@@ -69,31 +69,40 @@ fn conv_sums(layer: ConvLayer, width: u32, place: vec2<u32>, group: u32) -> mat4
                     conv_unpack(v3.zw), conv_unpack(v4.zw), conv_unpack(v5.zw));
             }
         }
-        row += width * pairs;
+        row += CONV_HALO * pairs;
         row_weight += 6u * groups;
     }
     return sums;
 }
 
-// All of a tile's outputs behind the activation, kept if it is `listed`, from its inputs and those around it.
-fn conv_tile(layer: ConvLayer, tile: ConvTile, listed: bool, lane: u32) {
-    let strips = tile.edge / CONV_STRIP;
-    let stride = 2u * ((layer.groups_out + 1u) / 2u);
-    for (var i = lane; i < strips * tile.edge * layer.groups_out; i += CONV_LANES) {
-        let group = i % layer.groups_out;
-        let strip = i / layer.groups_out;
+// A layer on a workgroup's tile, behind the activation. All invocations call it together.
+fn conv_layer(tile: ListedTile, lane: u32) {
+    let corner = tile.corner / SCALE;
+    let size = params.padded / SCALE;
+    for (var i = lane; i < CONV_HALO * CONV_HALO; i += CONV_LANES) {
+        let texel = vec2<i32>(corner + vec2<u32>(i % CONV_HALO, i / CONV_HALO)) - vec2<i32>(1);
+        var inputs = array<vec4<u32>, CONV_PAIRS>();
+        if (all(texel >= vec2<i32>(0)) && all(texel < vec2<i32>(size))) {
+            inputs = inputs_at(vec2<u32>(texel), size);
+        }
+        for (var pair = 0u; pair < CONV_PAIRS; pair++) {
+            conv_memory[CONV_PAIRS * i + pair] = inputs[pair];
+        }
+    }
+    workgroupBarrier();
+    let strips = CONV_EDGE / CONV_STRIP;
+    let stride = 2u * ((LAYER.groups_out + 1u) / 2u);
+    for (var i = lane; i < strips * CONV_EDGE * LAYER.groups_out; i += CONV_LANES) {
+        let group = i % LAYER.groups_out;
+        let strip = i / LAYER.groups_out;
         let place = vec2<u32>(CONV_STRIP * (strip % strips), strip / strips);
-        let sums = conv_sums(layer, tile.edge + 2u, place, group);
+        let sums = conv_sums(place, group);
         for (var k = 0u; k < CONV_STRIP; k++) {
-            let texel = tile.corner + place + vec2<u32>(k, 0u);
-            if (listed && all(texel < tile.size)) {
-                outputs[stride * (texel.x + tile.size.x * texel.y) + group] =
+            let texel = corner + place + vec2<u32>(k, 0u);
+            if (tile.listed && all(texel < size)) {
+                outputs[stride * (texel.x + size.x * texel.y) + group] =
                     conv_pack(max(sums[k], vec4<f32>(0.0)));
             }
         }
     }
-}
-
-fn conv_inside(texel: vec2<i32>, map_size: vec2<u32>) -> bool {
-    return all(texel >= vec2<i32>(0)) && all(texel < vec2<i32>(map_size));
 }

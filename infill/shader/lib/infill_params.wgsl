@@ -48,10 +48,6 @@ fn infill_tile_corner(params: InfillParams, tile: u32) -> vec2<u32> {
     return INFILL_TILE * vec2<u32>(tile - row * params.tiles.x, row);
 }
 
-fn infill_inside(params: InfillParams, pixel: vec2<i32>) -> bool {
-    return all(pixel >= vec2<i32>(0)) && all(pixel < vec2<i32>(params.size));
-}
-
 fn infill_pixel_index(params: InfillParams, pixel: vec2<u32>) -> u32 {
     return pixel.x + params.size.x * pixel.y;
 }
