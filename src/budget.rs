@@ -1,11 +1,13 @@
-//! The frame-time budget: how many rays a frame's first pass casts, and how far it looks ahead, so that it takes no longer
-//! than it should.
+//! The frame-time budget: how many rays a frame's first pass casts, whether it is a preview, and how far it looks ahead, so
+//! that it takes no longer than it should.
 //!
 //! A frame's time is predicted as its work, which a pre-pass estimates, times a cost per unit of work, which is learned
 //! while frames are rendered (V. Bruder, S. Frey, T. Ertl, Real-Time Performance Prediction and Tuning for Interactive
 //! Volume Raycasting, 2016).
 
 mod krls;
+mod outlook;
+mod setting;
 mod work;
 
 use gpu_primitives::memory::Ledger;
@@ -15,7 +17,10 @@ use wavefront::{Foveation, FrameView};
 use web_time::Instant;
 
 use krls::Krls;
-use work::{PrePass, Work};
+use outlook::{FEATURES, Outlook};
+use work::PrePass;
+
+pub(crate) use setting::{Sampling, Setting};
 
 use crate::wgpu;
 
@@ -35,16 +40,25 @@ pub enum BudgetMode {
     TwoPass,
 }
 
-/// Number of features.
-const FEATURES: usize = 10;
-/// Share of the rays that are cast at least.
-const LEAST_DENSITY: f64 = 1.0 / 64.0;
-/// Share of the rays of the first frame, of which nothing is known.
-const FIRST_DENSITY: f64 = 1.0 / 16.0;
+impl BudgetMode {
+    /// Whether its first passes may be previews. The second pass of [`BudgetMode::TwoPass`] has to go on from the first.
+    pub(crate) fn has_previews(self) -> bool {
+        matches!(self, Self::Predicted | Self::LastFrame)
+    }
+}
+
+/// Share of the picture's rays that is cast at least.
+const LEAST_SHARE: f64 = 1.0 / 64.0;
+/// That of the first frame, of which nothing is known.
+const FIRST_SHARE: f64 = 1.0 / 16.0;
 /// From frame to frame the step between rays shrinks by this factor at most (the publication's limit).
 const MOST_STEP: f64 = 0.8;
 /// What a prediction about something entirely new is multiplied by, less 1.
 const CAUTION: f64 = 0.5;
+/// Part of a target below which the frame before leaves room for a trial, and frames from one that took too long to the next.
+const ROOM: f64 = 0.85;
+const LEAST_WAIT: u32 = 4;
+const MOST_WAIT: u32 = 64;
 /// Relative error of predictions before any was compared, the most that one counts as, and how much the newest counts.
 const FIRST_SPREAD: f64 = 0.05;
 const MOST_ERROR: f64 = 0.5;
@@ -53,22 +67,17 @@ const SPREAD_RATE: f64 = 0.1;
 const SPREADS: f64 = 1.5;
 /// Part of a time that is clearly less.
 const CLEARLY_LESS: f64 = 0.9;
-/// Densities between the most and the least that are looked at.
+/// Shares between the most and the least that are looked at.
 const CANDIDATES: u32 = 48;
 /// Unusable times in a row after which the clock counts as broken.
 const MOST_UNUSABLE: u32 = 3;
-/// Work of starting a pixel's ray, of filling a pixel and of decoding a coarse cell, in visits of a block.
-const START_WORK: f64 = 0.1;
-const FILL_WORK: f64 = 4.0;
-const DECODE_WORK: f64 = 2000.0;
-/// Part of what is decoded that a doubled look-ahead adds, before anything was learned.
-const LOOK_AHEAD_WORK: f64 = 0.25;
-
 /// A frame that a setting is wanted for.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Request<'a> {
     pub(crate) view: &'a FrameView,
     pub(crate) size: [u32; 2],
+    /// Pixels from one ray to the next in both directions that the first pass may have, ascending from 1.
+    pub(crate) steps: &'a [u32],
     pub(crate) isovalue: f32,
     pub(crate) look_ahead: u32,
     /// Whether pixels without a cast ray are filled.
@@ -82,8 +91,10 @@ pub(crate) struct Choice {
     features: [f64; FEATURES],
     /// 0 without a pre-pass.
     work: f64,
-    /// Share of the rays that the frame's first pass may cast, and how far it looks ahead.
-    pub(crate) density: f64,
+    pub(crate) setting: Setting,
+    /// The share that was asked for: about that of the setting.
+    asked: f64,
+    /// How far it looks ahead.
     pub(crate) look_ahead: u32,
     pub(crate) predicted_ms: Option<f64>,
     pub(crate) target_ms: f64,
@@ -91,18 +102,12 @@ pub(crate) struct Choice {
     pub(crate) cpu_ms: f64,
 }
 
-impl Choice {
-    /// The sampling mask of the frame's passes; `None`: all rays at once.
-    pub(crate) fn foveation(&self) -> Option<Foveation> {
-        // So that the passes after the first, which cast what is left, are about as long.
-        let passes = (2.0 / self.density).ceil() as u32;
-        (self.density < 1.0).then_some(Foveation {
-            sigma: 0.0,
-            base_density: self.density as f32,
-            passes: passes.clamp(1, Foveation::MOST_PASSES),
-            ..Foveation::default()
-        })
-    }
+/// A frame whose time is known: the share that was asked for, what it took, and its work.
+#[derive(Clone, Copy, Debug)]
+struct Measured {
+    asked: f64,
+    ms: f64,
+    work: f64,
 }
 
 /// Chooses settings and learns from times.
@@ -117,9 +122,15 @@ pub(crate) struct Budget {
     model: Krls<FEATURES>,
     /// Logarithm of the milliseconds per unit of work of the first frame that was measured.
     level: Option<f64>,
-    /// Density and time of the newest frame that was measured, and the density that was chosen last.
-    last: Option<(f64, f64)>,
-    density: f64,
+    /// The newest frame that was measured, and the share that was asked for last.
+    last: Option<Measured>,
+    asked: f64,
+    /// Whether that is a trial, frames until the next one, and how many there were between the newest ones.
+    is_trial: bool,
+    trial_in: u32,
+    trial_wait: u32,
+    /// First and last steps that a frame with a usable time had.
+    steps_seen: Vec<[u32; 2]>,
     /// Mean size of the newest predictions' relative errors.
     spread: f64,
     unusable: u32,
@@ -138,7 +149,11 @@ impl Budget {
             model: Krls::default(),
             level: None,
             last: None,
-            density: FIRST_DENSITY,
+            asked: FIRST_SHARE,
+            is_trial: false,
+            trial_in: 0,
+            trial_wait: 0,
+            steps_seen: Vec::new(),
             spread: FIRST_SPREAD,
             unusable: 0,
             learning_ms: 0.0,
@@ -196,48 +211,66 @@ impl Budget {
         let work = self.pre_pass.as_mut().map(|pre_pass| pre_pass.estimate(view, size, isovalue));
         let cached = self.cached;
         let outlook_of = |look_ahead| {
-            work.map(|w| Outlook::new(&Request { look_ahead, ..*request }, &w, cached))
+            work.map(|work| Outlook::new(&Request { look_ahead, ..*request }, &work, cached))
         };
         let mut look_ahead = request.look_ahead;
         let mut outlook = outlook_of(look_ahead);
-        let density = match (self.mode, &outlook) {
+        let asked = match (self.mode, &outlook) {
             _ if self.unusable >= MOST_UNUSABLE => 1.0,
             (BudgetMode::Fixed, _) => 1.0,
-            (BudgetMode::TwoPass, _) => (self.after_last(target_ms) / 4.0).max(LEAST_DENSITY),
-            (BudgetMode::Predicted, Some(asked)) if self.level.is_some() => {
-                let density = self.fitting(asked, target_ms);
-                let is_too_long = self.cautious_ms(asked, density) > target_ms;
-                if cached && look_ahead > 1 && is_too_long {
+            (BudgetMode::TwoPass, _) => (self.after_last(target_ms) / 4.0).max(LEAST_SHARE),
+            (BudgetMode::Predicted, Some(known)) if self.level.is_some() => {
+                let (asked, fits) = self.fitting(known, request);
+                if cached && look_ahead > 1 && !fits {
                     // What too few rays do not make room for may be what is decoded for later.
                     look_ahead = 1;
                     outlook = outlook_of(look_ahead);
-                    outlook.map_or(density, |outlook| self.fitting(&outlook, target_ms))
+                    outlook.map_or(asked, |outlook| self.fitting(&outlook, request).0)
                 } else {
-                    density
+                    asked
                 }
             }
             _ => self.after_last(target_ms),
         };
-        self.density = density;
+        let setting = Setting::new(asked, request.steps);
+        self.asked = asked;
         let (mut features, mut units, mut predicted_ms) = ([0.0; FEATURES], 0.0, None);
         if let Some(outlook) = &outlook {
-            (features, units) = (outlook.features(density), outlook.units(density));
-            predicted_ms = self.predict(outlook, density).map(|(ms, _)| ms);
+            (features, units) = (outlook.features(&setting), outlook.units(&setting));
+            predicted_ms = self.predict(outlook, &setting).map(|(ms, _)| ms);
         }
         let cpu_ms = begin.elapsed().as_secs_f64() * 1e3 + self.learning_ms;
-        Choice { features, work: units, density, look_ahead, predicted_ms, target_ms, cpu_ms }
+        Choice {
+            features,
+            work: units,
+            setting,
+            asked,
+            look_ahead,
+            predicted_ms,
+            target_ms,
+            cpu_ms,
+        }
     }
 
-    /// The sampling mask of a frame from its second pass on: that of its first one, or with [`BudgetMode::TwoPass`]
-    /// one of as many rays as that one's time leaves room for, once it is known.
-    pub(crate) fn second(&self, choice: &Choice, first: Option<Foveation>) -> Option<Foveation> {
-        let two_pass = self.last.filter(|(density, _)| {
-            self.mode == BudgetMode::TwoPass && density.to_bits() == choice.density.to_bits()
+    /// Which rays a frame casts from its second pass on: more of those of its first one; after a preview that one's and as
+    /// large a share of the others; or with [`BudgetMode::TwoPass`] as many as the first one's time leaves room for, once
+    /// it is known.
+    pub(crate) fn second(&self, choice: &Choice) -> Option<Sampling> {
+        let Setting { last, share, .. } = choice.setting;
+        if last > 1 {
+            return Some(Sampling { lattice: last, ..Sampling::even(share)? });
+        }
+        let sampling = choice.setting.newest_sampling();
+        let two_pass = self.last.filter(|last| {
+            self.mode == BudgetMode::TwoPass && last.asked.to_bits() == choice.asked.to_bits()
         });
-        let (Some((density, ms)), Some(first)) = (two_pass, first) else { return first };
-        let fits = (density * choice.target_ms / ms).clamp(density, 1.0);
+        let (Some(Measured { asked, ms, .. }), Some(first)) = (two_pass, sampling) else {
+            return sampling;
+        };
+        let fits = (asked * choice.target_ms / ms).clamp(asked, 1.0);
         // The mask of the second pass has 1 - (1 - d)^2 of the rays.
-        Some(Foveation { base_density: 1.0 - (1.0 - fits as f32).sqrt(), ..first })
+        let base_density = 1.0 - (1.0 - fits as f32).sqrt();
+        Some(Sampling { foveation: Foveation { base_density, ..first.foveation }, ..first })
     }
 
     /// Learns what a frame's first pass took.
@@ -246,9 +279,19 @@ impl Budget {
             self.unusable += 1;
             return;
         }
-        let begin = Instant::now();
         self.unusable = 0;
-        self.last = Some((choice.density, ms));
+        let Setting { first, last, .. } = choice.setting;
+        if !self.steps_seen.contains(&[first, last]) {
+            self.steps_seen.push([first, last]);
+            if first > 1 {
+                // Drivers finish compiling kernels when they first run.
+                self.is_trial = false;
+                return;
+            }
+        }
+        let begin = Instant::now();
+        self.last = Some(Measured { asked: choice.asked, ms, work: choice.work });
+        self.end_trial(ms > choice.target_ms);
         if let Some(predicted_ms) = choice.predicted_ms {
             let error = (ms / predicted_ms).ln().abs().min(MOST_ERROR);
             self.spread += SPREAD_RATE * (error - self.spread);
@@ -262,109 +305,91 @@ impl Budget {
         self.learning_ms = begin.elapsed().as_secs_f64() * 1e3;
     }
 
-    /// The density by what the last frame took; the safe one if there was none.
-    fn after_last(&self, target_ms: f64) -> f64 {
-        let Some((density, ms)) = self.last else { return FIRST_DENSITY };
-        (density * target_ms / ms).min(density / MOST_STEP).clamp(LEAST_DENSITY, 1.0)
+    /// Takes in whether the newest frame took too long. A trial that did makes the next one wait twice as long.
+    fn end_trial(&mut self, is_too_long: bool) {
+        self.trial_in = self.trial_in.saturating_sub(1);
+        if std::mem::take(&mut self.is_trial) {
+            let longer = (2 * self.trial_wait).clamp(LEAST_WAIT, MOST_WAIT);
+            self.trial_wait = if is_too_long { longer } else { 0 };
+            self.trial_in = self.trial_wait;
+        }
     }
 
-    /// The largest density that is predicted to fit. Where none does, the one that is predicted to take clearly less than
-    /// the frame before's, or half of that one: what is not known may be better. Fewer rays leave more pixels to fill, so
-    /// time need not fall with them; from the least density on, the way is up again.
-    fn fitting(&self, outlook: &Outlook, target_ms: f64) -> f64 {
-        let most = (self.density / MOST_STEP).clamp(LEAST_DENSITY, 1.0);
-        let (mut best, mut least_ms) = (LEAST_DENSITY, f64::INFINITY);
-        for i in 0..=CANDIDATES {
-            let share = f64::from(i) / f64::from(CANDIDATES);
-            let density = (most * (LEAST_DENSITY / most).powf(share)).max(LEAST_DENSITY);
-            let ms = self.cautious_ms(outlook, density);
+    /// The share by what the last frame took; the safe one if there was none.
+    fn after_last(&self, target_ms: f64) -> f64 {
+        let Some(Measured { asked, ms, .. }) = self.last else { return FIRST_SHARE };
+        (asked * target_ms / ms).min(asked / MOST_STEP).clamp(LEAST_SHARE, 1.0)
+    }
+
+    /// The largest share that is predicted to fit, and whether there is one. Where none does, the one that is predicted to
+    /// take clearly less than the frame before's, or half of that one: what is not known may be better. Fewer rays leave
+    /// more pixels to fill, so time need not fall with them; from the least share on, the way is up again.
+    fn fitting(&mut self, outlook: &Outlook, request: &Request<'_>) -> (f64, bool) {
+        let target_ms = request.target_ms;
+        let most = (self.asked / MOST_STEP).clamp(LEAST_SHARE, 1.0);
+        let settings = (0..=CANDIDATES).map(|i| {
+            let part = f64::from(i) / f64::from(CANDIDATES);
+            let asked = (most * (LEAST_SHARE / most).powf(part)).max(LEAST_SHARE);
+            (asked, Setting::new(asked, request.steps))
+        });
+        let (mut best, mut least_ms, mut fits) = (LEAST_SHARE, f64::INFINITY, None);
+        for (asked, setting) in settings.clone() {
+            let ms = self.cautious_ms(outlook, &setting);
             if ms <= target_ms {
-                return density;
+                fits = Some(asked);
+                break;
             }
             if ms < least_ms {
-                (best, least_ms) = (density, ms);
+                (best, least_ms) = (asked, ms);
             }
         }
-        let at_least = self.density <= LEAST_DENSITY;
-        if at_least || least_ms < CLEARLY_LESS * self.cautious_ms(outlook, self.density) {
-            best
-        } else {
-            (0.5 * self.density).max(LEAST_DENSITY)
+        if let Some(more) = self.trial(outlook, target_ms, settings)
+            && fits.is_none_or(|fits| fits < more)
+        {
+            self.is_trial = true;
+            return (more, true);
         }
+        if let Some(fits) = fits {
+            return (fits, true);
+        }
+        let before_ms = self.cautious_ms(outlook, &Setting::new(self.asked, request.steps));
+        let at_least = self.asked <= LEAST_SHARE;
+        if at_least || least_ms < CLEARLY_LESS * before_ms {
+            (best, false)
+        } else {
+            ((0.5 * self.asked).max(LEAST_SHARE), false)
+        }
+    }
+
+    /// The largest share that fits if it costs as much per unit of work as the frame before, where that one left much room
+    /// and it is time to try: what was never tried, or was slow once for another reason, would never be tried else.
+    fn trial(
+        &self,
+        outlook: &Outlook,
+        target_ms: f64,
+        mut settings: impl Iterator<Item = (f64, Setting)>,
+    ) -> Option<f64> {
+        let last = self.last.filter(|last| last.work > 0.0 && last.ms < ROOM * target_ms)?;
+        let spread = (SPREADS * self.spread).exp();
+        let ms_of = |setting: &Setting| last.ms * outlook.units(setting) / last.work * spread;
+        let fits = |(_, setting): &(f64, Setting)| ms_of(setting) <= target_ms;
+        let wanted = self.trial_in == 0;
+        wanted.then(|| settings.find(fits)).flatten().map(|(asked, _)| asked)
     }
 
     /// More than most times that are predicted like this: about one in nine of those that scatter as the newest did
     /// lies above.
-    fn cautious_ms(&self, outlook: &Outlook, density: f64) -> f64 {
+    fn cautious_ms(&self, outlook: &Outlook, setting: &Setting) -> f64 {
         let spread = (SPREADS * self.spread).exp();
-        self.predict(outlook, density)
+        self.predict(outlook, setting)
             .map_or(f64::INFINITY, |(ms, novelty)| ms * (1.0 + CAUTION * novelty) * spread)
     }
 
     /// Milliseconds, and how new this is.
-    fn predict(&self, outlook: &Outlook, density: f64) -> Option<(f64, f64)> {
+    fn predict(&self, outlook: &Outlook, setting: &Setting) -> Option<(f64, f64)> {
         let level = self.level?;
-        let (cost, novelty) = self.model.predict(&outlook.features(density));
-        Some((outlook.units(density) * (level + cost).exp(), novelty))
-    }
-}
-
-/// What is known of a frame before its density is chosen.
-#[derive(Clone, Copy, Debug)]
-struct Outlook {
-    /// In visits of a block: for every frame, more if all rays are cast, or if all pixels are filled instead, and for
-    /// all blocks that such a frame decodes.
-    started: f64,
-    cast: f64,
-    filled: f64,
-    decoded: f64,
-    look_ahead: u32,
-    /// With a density of 1.
-    features: [f64; FEATURES],
-}
-
-impl Outlook {
-    fn new(request: &Request<'_>, work: &Work, cached: bool) -> Self {
-        let Request { view, size, look_ahead, fills, .. } = *request;
-        let middle = size.map(|s| s / 2);
-        let (_, direction, _) = view.ray(middle);
-        let (_, beside, _) = view.ray([middle[0] + 1, middle[1]]);
-        let apart = glam::DVec3::from(direction).distance(beside.into());
-        let voxels_per_pixel = (apart * work.distance_voxels).max(1e-3);
-        let rays = size.map(f64::from).iter().product::<f64>();
-        let fresh = if cached { work.fresh } else { 0.0 };
-        Self {
-            started: rays * START_WORK,
-            cast: rays * work.entered * (1.0 + work.visited),
-            filled: if fills { rays * work.entered * FILL_WORK } else { 0.0 },
-            decoded: fresh * work.in_sight * DECODE_WORK,
-            look_ahead,
-            features: [
-                0.0,
-                (1.0 + work.visited).ln(),
-                work.entered,
-                0.5 * (1.0 + work.depth_voxels).ln(),
-                2.0 * fresh,
-                0.3 * f64::from(look_ahead.max(1)).ln(),
-                0.3 * voxels_per_pixel.ln(),
-                0.5 * rays.ln(),
-                0.4 * direction[0],
-                0.4 * direction[1],
-            ],
-        }
-    }
-
-    /// Work in visits of a block.
-    fn units(&self, density: f64) -> f64 {
-        let rays = self.started + density * self.cast + (1.0 - density) * self.filled;
-        let ahead = 1.0 + LOOK_AHEAD_WORK * f64::from(self.look_ahead.max(1)).log2();
-        rays + self.decoded * ahead * density.sqrt()
-    }
-
-    fn features(&self, density: f64) -> [f64; FEATURES] {
-        let mut features = self.features;
-        features[0] = 0.7 * density.ln();
-        features
+        let (cost, novelty) = self.model.predict(&outlook.features(setting));
+        Some((outlook.units(setting) * (level + cost).exp(), novelty))
     }
 }
 
@@ -422,12 +447,19 @@ mod tests {
         let frame = |number: u32| {
             let distance = 0.8 + 0.3 * (f64::from(number) * 0.1).sin();
             let view = view(3.0 * f64::from(number), distance);
-            let request =
-                Request { view: &view, size: SIZE, isovalue: 0.5, look_ahead: 2, fills, target_ms };
+            let request = Request {
+                view: &view,
+                size: SIZE,
+                steps: &[1],
+                isovalue: 0.5,
+                look_ahead: 2,
+                fills,
+                target_ms,
+            };
             let choice = budget.choose(&request);
-            let ms = cost(choice.density, number);
+            let ms = cost(choice.asked, number);
             budget.learn(&choice, ms);
-            (choice.density, ms)
+            (choice.asked, ms)
         };
         (0..frames).map(frame).collect()
     }
@@ -451,6 +483,7 @@ mod tests {
             let request = Request {
                 view: &view,
                 size: SIZE,
+                steps: &[1],
                 isovalue: 0.5,
                 look_ahead: 4,
                 fills: false,
@@ -481,7 +514,7 @@ mod tests {
     fn what_does_not_fit_gets_the_least_density() {
         for mode in [BudgetMode::Predicted, BudgetMode::LastFrame] {
             let shown = show(&mut budget(mode), 30, 1e-3, false, |density, _| 100.0 * density);
-            assert!((shown[29].0 - LEAST_DENSITY).abs() < 1e-3, "{mode:?}: {:?}", shown[29]);
+            assert!((shown[29].0 - LEAST_SHARE).abs() < 1e-3, "{mode:?}: {:?}", shown[29]);
         }
     }
 
@@ -492,7 +525,7 @@ mod tests {
         show(&mut budget, 40, 200.0, true, |density, _| 110.0 - 10.0 * density);
         let shown = show(&mut budget, 20, 50.0, true, |density, _| 110.0 - 10.0 * density);
         let least = shown.iter().map(|shown| shown.0).fold(1.0, f64::min);
-        assert!(least <= LEAST_DENSITY * 1.01, "{shown:?}");
+        assert!(least <= LEAST_SHARE * 1.01, "{shown:?}");
     }
 
     #[test]
@@ -528,7 +561,7 @@ mod tests {
                 (fixed_ms + all_rays_ms * density) * factor
             };
             let shown = show(&mut budget(mode), 60, target_ms, fills, cost);
-            prop_assert!(shown.iter().all(|(density, _)| (LEAST_DENSITY..=1.0).contains(density)), "{shown:?}");
+            prop_assert!(shown.iter().all(|(density, _)| (LEAST_SHARE..=1.0).contains(density)), "{shown:?}");
             for pair in shown.windows(2) {
                 prop_assert!(pair[1].0 <= pair[0].0 / MOST_STEP * (1.0 + 1e-9), "{pair:?}");
             }
@@ -570,17 +603,18 @@ mod tests {
         let request = Request {
             view: &view,
             size: SIZE,
+            steps: &[1],
             isovalue: 0.5,
             look_ahead: 2,
             fills: false,
             target_ms: 20.0,
         };
         let choice = budget.choose(&request);
-        let first = choice.foveation();
-        assert_eq!(budget.second(&choice, first), first, "nothing is known of it yet");
+        let first = choice.setting.first_sampling();
+        assert_eq!(budget.second(&choice), first, "nothing is known of it yet");
         budget.learn(&choice, 5.0);
-        let second = budget.second(&choice, first).map(|f| f64::from(f.base_density));
-        let expected = 1.0 - (1.0 - 4.0 * choice.density).sqrt();
+        let second = budget.second(&choice).map(|s| f64::from(s.foveation.base_density));
+        let expected = 1.0 - (1.0 - 4.0 * choice.asked).sqrt();
         assert!(second.is_some_and(|d| (d - expected).abs() < 1e-6), "{second:?}: {expected}");
     }
 }

@@ -5,6 +5,7 @@ mod arriving;
 mod blocking;
 mod budget;
 mod capture;
+mod casting;
 mod error;
 mod faults;
 mod load;

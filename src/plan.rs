@@ -7,7 +7,7 @@ use gpu_primitives::readback::ReadbackRing;
 use infill::InfillPlan;
 use lru_cache_gpu::{CachePlan, CacheRoom, ResidentPlan};
 use macrocell::{MacrocellPlan, Masks, RangeScratch};
-use wavefront::{DrawBuffers, WavefrontPlan};
+use wavefront::{DrawBuffers, PreviewBinds, WavefrontPlan};
 use zfp_gpu::{DecodeBuffers, ExtremaBuffers, PayloadPlan, StreamLayout};
 
 use crate::budget::Budget;
@@ -16,7 +16,9 @@ use crate::records::{CONTROL_BYTES, PASSES_IN_FLIGHT, readback_bytes};
 use crate::samples::SamplePlan;
 use crate::schedule::FIRST_CELLS;
 use crate::strategy::StrategyPlan;
-use crate::{CompressedVolume, Error, InfillOptions, RendererOptions, Residency, capture, wgpu};
+use crate::{
+    BudgetMode, CompressedVolume, Error, InfillOptions, RendererOptions, Residency, capture, wgpu,
+};
 
 /// Largest upload chunk of a frame's parameters.
 pub(crate) const PARAMS_CHUNK: u64 = 1024;
@@ -65,6 +67,23 @@ pub struct Work {
     pub blocks_loaded: u64,
 }
 
+/// Pixels from one of a preview's to the next that a frame's first pass may have.
+const PREVIEW_STEPS: [u32; 2] = [2, 4];
+
+/// What previews of one size need.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct PreviewPlan {
+    pub(crate) step: u32,
+    pub(crate) wavefront: WavefrontPlan,
+    pub(crate) infill: InfillPlan,
+}
+
+impl PreviewPlan {
+    fn bytes(&self) -> u64 {
+        self.wavefront.bytes() + self.infill.bytes()
+    }
+}
+
 /// What a scene needs, computed from the volume's layout, the options and the device's limits alone.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScenePlan {
@@ -77,6 +96,7 @@ pub struct ScenePlan {
     pub(crate) infill: Option<InfillPlan>,
     /// Those asked for, unless in-fill does not pay.
     pub(crate) infill_options: Option<InfillOptions>,
+    pub(crate) previews: Vec<PreviewPlan>,
     parts: Vec<Part>,
     budget_bytes: u64,
 }
@@ -240,6 +260,7 @@ struct Scene<'a> {
     infill: Option<InfillPlan>,
     /// What of the options' in-fill pays.
     infill_options: Option<InfillOptions>,
+    previews: Vec<PreviewPlan>,
 }
 
 impl<'a> Scene<'a> {
@@ -257,12 +278,21 @@ impl<'a> Scene<'a> {
         let wavefront =
             WavefrontPlan::new(options.size, outputs, limits)?.with_foveation(options.blue_noise());
         let strategy = StrategyPlan::new(options.strategy, wavefront.rays(), limits)?;
-        let infill = infill_options
-            .map(|infill| {
-                let network = infill.network.is_some();
-                InfillPlan::new(options.size, infill.sources, network, &macrocell, limits)
-            })
-            .transpose()?;
+        let infill_plan = |infill: InfillOptions, size| {
+            let network = infill.network.is_some();
+            InfillPlan::new(size, infill.sources, network, &macrocell, limits)
+        };
+        let infill = infill_options.map(|infill| infill_plan(infill, options.size)).transpose()?;
+        let mut previews = Vec::new();
+        let has_previews = options.budget.is_some_and(BudgetMode::has_previews)
+            && matches!(strategy, StrategyPlan::RunAhead);
+        if let (Some(asked), true) = (infill_options, has_previews) {
+            for step in PREVIEW_STEPS {
+                let Some(wavefront) = wavefront.preview(step) else { continue };
+                let infill = infill_plan(asked, wavefront.size())?;
+                previews.push(PreviewPlan { step, wavefront, infill });
+            }
+        }
         Ok(Self {
             options,
             limits,
@@ -273,6 +303,7 @@ impl<'a> Scene<'a> {
             strategy,
             infill,
             infill_options,
+            previews,
         })
     }
 
@@ -359,6 +390,7 @@ impl<'a> Scene<'a> {
             strategy: self.strategy,
             infill: self.infill.clone(),
             infill_options: self.infill_options,
+            previews: self.previews.clone(),
             parts,
             budget_bytes: self.options.budget_bytes,
         }
@@ -402,7 +434,7 @@ impl<'a> Scene<'a> {
         ]
     }
 
-    fn picture_parts(&self) -> [Part; 7] {
+    fn picture_parts(&self) -> [Part; 8] {
         let Self { options, wavefront, .. } = self;
         [
             Part::new("pictures", When::Always, wavefront.output_bytes(), picture_names(wavefront)),
@@ -440,6 +472,16 @@ impl<'a> Scene<'a> {
                     Part::new("frame budget", When::Rendering, bytes, "ranges read back once")
                 }
                 None => Part::left_out("frame budget", "not asked for"),
+            },
+            if self.previews.is_empty() {
+                Part::left_out("previews", "no frame budget with in-fill that needs them")
+            } else {
+                // Bound for the picture and for the next finer preview, if there is one.
+                let binds = 2 * self.previews.len() as u64 - 1;
+                let bytes: u64 = self.previews.iter().map(PreviewPlan::bytes).sum();
+                let bytes = bytes + binds * PreviewBinds::BYTES;
+                let why = "first passes of every second or fourth pixel in both directions";
+                Part::new("previews", When::Rendering, bytes, why)
             },
         ]
     }

@@ -59,6 +59,11 @@ pub(crate) struct PassInfo {
     /// Lists of active rays made before the first round of each pass.
     pub(crate) lists_at_start: u32,
     pub(crate) pixels: u32,
+    /// Rays that the pass has, of every `step`-th pixel in both directions.
+    pub(crate) rays: u32,
+    pub(crate) step: u32,
+    /// Whether unfinished pixels show what a preview had.
+    pub(crate) is_resumed: bool,
     /// Whether only the rays of a sampling mask are cast.
     pub(crate) foveated: bool,
     /// What its setting was chosen by.
@@ -70,9 +75,48 @@ pub(crate) struct PassInfo {
     /// Share of the rays that enter the volume that is enough.
     pub(crate) stop_at: Option<f32>,
     pub(crate) dispatches: u32,
+    /// Length of the volume's diagonal.
+    pub(crate) diagonal_voxels: f32,
     /// When recording began.
     pub(crate) begin: Instant,
     pub(crate) cpu_ms: f64,
+}
+
+/// What a pass's rays have done, as a report tells it.
+#[derive(Debug, Clone, Copy)]
+struct RayCounts {
+    sampled: u32,
+    entered: u32,
+    active: u32,
+    /// Pixels that are final.
+    exact: u32,
+    filled: u32,
+    open_depth_voxels: f32,
+}
+
+impl RayCounts {
+    fn new(info: &PassInfo, rays: &wavefront::Counters, filled: u32) -> Self {
+        let sampled = if info.foveated { rays.sampled } else { info.rays };
+        let exact = info.rays - rays.active.min(info.rays);
+        let filled = if info.is_resumed { rays.active } else { filled };
+        if info.step <= 1 {
+            return Self {
+                sampled,
+                entered: rays.entered,
+                active: rays.active,
+                exact,
+                filled,
+                open_depth_voxels: rays.open_depth_voxels(),
+            };
+        }
+        // Each stands for as many as the picture has for one of the preview's; of what the others meet, nothing is known.
+        let entered = rays.entered.saturating_mul(info.step * info.step).min(info.pixels);
+        let finished = rays.entered - rays.active.min(rays.entered);
+        let active = entered.saturating_sub(finished).max(1);
+        let filled = active - rays.active.saturating_sub(filled).min(active);
+        let open_depth_voxels = info.diagonal_voxels;
+        Self { sampled, entered, active, exact, filled, open_depth_voxels }
+    }
 }
 
 /// A pass whose counters have not come back yet.
@@ -264,7 +308,7 @@ impl PassRecords {
         let rounds_before = if same_frame { self.report.rounds } else { 0 };
         let cut_before = if same_frame { self.report.cut_walks } else { 0 };
         let rounds = rounds.saturating_sub(rounds_before);
-        self.schedule.take(info.pass == 1, rounds, ms);
+        self.schedule.take(info.pass == 1, rounds, ms * f64::from(info.step * info.step));
         let in_force = info.most_cells == self.schedule.most_cells();
         if rounds > 0 && cut != cut_before && in_force {
             self.schedule.calibrate(ms / f64::from(rounds), info.pass_ms);
@@ -275,6 +319,7 @@ impl PassRecords {
         let gpu_ms = self.timer.milliseconds(record.ticks);
         let rounds = record.rays.lists.saturating_sub(info.lists_at_start);
         self.take_time(info, rounds, record.rays.cut, gpu_ms);
+        let counts = RayCounts::new(&info, &record.rays, filled);
         let since = |now: u32, before: u32| now.wrapping_sub(before);
         let report = &mut self.report;
         report.frame = info.frame;
@@ -284,23 +329,25 @@ impl PassRecords {
         report.cpu_ms = info.cpu_ms;
         report.gpu_ms = gpu_ms;
         report.look_ahead = info.look_ahead;
-        report.density = info.choice.map_or(1.0, |choice| choice.density as f32);
+        report.step = info.step;
+        report.density = info.choice.map_or(1.0, |choice| choice.setting.share as f32);
         report.predicted_ms = info.choice.and_then(|choice| choice.predicted_ms);
         report.budget_ms = info.choice.map_or(0.0, |choice| choice.cpu_ms);
         report.rays = info.pixels;
-        report.sampled_rays = if info.foveated { record.rays.sampled } else { info.pixels };
-        report.entered_rays = record.rays.entered;
-        report.active_rays = record.rays.active;
+        report.sampled_rays = counts.sampled;
+        report.entered_rays = counts.entered;
+        report.active_rays = counts.active;
+        report.exact = counts.exact;
         report.most_cells = record.rays.most_cells;
         report.cells_bound = info.most_cells;
         report.cut_walks = record.rays.cut;
         report.hits = record.rays.hits;
-        report.open_depth_voxels = record.rays.open_depth_voxels();
-        report.filled_pixels = filled;
+        report.open_depth_voxels = counts.open_depth_voxels;
+        report.filled_pixels = counts.filled;
         // As `gate.wgsl` of in-fill decides it.
-        let entered = record.rays.entered;
-        let finished = (entered - record.rays.active.min(entered)) as f32;
-        report.stopped = info.stop_at.is_some_and(|share| finished >= share * entered as f32);
+        let finished = (counts.entered - counts.active.min(counts.entered)) as f32;
+        let enough = |share: f32| finished >= share * counts.entered as f32;
+        report.stopped = info.stop_at.is_some_and(enough);
         report.blocks_used = since(record.cache.used, record.cache_before.used);
         report.blocks_requested = since(record.cache.requested, record.cache_before.requested);
         report.blocks_decoded = since(record.cache.decoded, record.cache_before.decoded);

@@ -1,6 +1,7 @@
 //! The renderer: schedule and state.
 
 mod change;
+mod frame_passes;
 mod frame_state;
 #[cfg(test)]
 mod slots_tests;
@@ -8,13 +9,11 @@ mod slots_tests;
 use gpu_primitives::kernel::dispatches_recorded;
 use gpu_primitives::memory::{Category, Ledger};
 use gpu_primitives::upload::UploadRing;
-use infill::Method;
-use wavefront::{FrameView, OutputTextures, ShadingParams};
+use wavefront::{FrameView, OutputTextures};
 use web_time::Instant;
 
 use frame_state::FrameState;
 
-use crate::budget::Request;
 use crate::capture::PendingCapture;
 use crate::faults::{Faults, Scopes, Task, is_lost};
 use crate::load::{LoadStages, Loader};
@@ -58,8 +57,8 @@ pub struct ProgressiveIsoRenderer {
     frame: Option<FrameState>,
     frame_count: u64,
     active_isovalue: Option<f32>,
-    /// Isovalue of the hits that the pictures show, if they show those of the newest frame that started.
-    shown_isovalue: Option<f32>,
+    /// Steps and the isovalues of the hits that their rays have found last.
+    shown: Vec<(u32, f32)>,
     clear_cache: bool,
 }
 
@@ -123,7 +122,7 @@ impl ProgressiveIsoRenderer {
             frame: None,
             frame_count: 0,
             active_isovalue: None,
-            shown_isovalue: None,
+            shown: Vec::new(),
             clear_cache: false,
         })
     }
@@ -153,8 +152,11 @@ impl ProgressiveIsoRenderer {
             first_misses: 0,
             passes: 0,
             rounds: 0,
-            foveation: None,
+            sampling: None,
             choice: None,
+            step: 1,
+            resumed_step: 1,
+            lists: 0,
         });
         self.records.report.newest_frame = self.frame_count;
         Ok(())
@@ -250,7 +252,7 @@ impl ProgressiveIsoRenderer {
     /// Starts the current frame again as if nothing had been recorded for it.
     fn start_again(&mut self) {
         self.active_isovalue = None;
-        self.shown_isovalue = None;
+        self.shown.clear();
         if let Some(state) = &mut self.frame {
             self.clear_cache |= state.clears_cache;
             self.frame_count += 1;
@@ -259,6 +261,7 @@ impl ProgressiveIsoRenderer {
             state.clears_cache = false;
             state.passes = 0;
             state.rounds = 0;
+            (state.step, state.resumed_step, state.lists) = (1, 1, 0);
             self.records.report.newest_frame = self.frame_count;
         }
     }
@@ -339,119 +342,6 @@ impl ProgressiveIsoRenderer {
         Ok(())
     }
 
-    /// Records the rounds of one pass of the current frame, once the volume is loaded.
-    fn record_frame(&mut self, device: &wgpu::Device, encoder: &mut wgpu::CommandEncoder) {
-        self.record_start(device, encoder);
-        let (Phase::Rendering(rendering), Some(state)) = (&self.phase, &mut self.frame) else {
-            return;
-        };
-        if let (Some(budget), Some(choice), 1) = (&self.records.budget, &state.choice, state.passes)
-        {
-            state.foveation = budget.second(choice, state.foveation);
-        }
-        if state.passes > 0
-            && let Some(sampling) = state.sampling(self.options.size)
-        {
-            let (stages, upload) = (&self.stages, &mut self.upload);
-            rendering.record_mask(device, encoder, upload, stages, &sampling);
-        }
-        state.passes += 1;
-        if state.passes == 2 && state.choice.is_some() {
-            // From now on the frame looks as far ahead as it is asked to.
-            let params = state.params(&self.plan);
-            rendering.rays().record_params(device, encoder, &mut self.upload, &params);
-        }
-        let options = &state.frame.options;
-        let pass_ms = options.pass_ms.min(options.target_ms.unwrap_or(f32::INFINITY));
-        let first = state.passes == 1;
-        for _ in 0..self.records.schedule.rounds(first, options.rounds_per_pass, pass_ms) {
-            state.rounds += 1;
-            let _span =
-                tracing::debug_span!("progressive_iso.round", round = state.rounds).entered();
-            rendering.record_round(encoder, &self.stages, options.guided);
-        }
-        match options.infill {
-            Infill::Off => {}
-            Infill::Classical => rendering.record_fill(encoder, &self.stages, Method::Classical),
-            Infill::Network => rendering.record_fill(encoder, &self.stages, Method::Network),
-        }
-    }
-
-    /// Records the start of the current frame unless it has started.
-    fn record_start(&mut self, device: &wgpu::Device, encoder: &mut wgpu::CommandEncoder) {
-        let (Phase::Rendering(rendering), Some(state)) = (&self.phase, &mut self.frame) else {
-            return;
-        };
-        if std::mem::replace(&mut state.started, true) {
-            return;
-        }
-        let _span = tracing::debug_span!("progressive_iso.start").entered();
-        let (stages, frame, upload) = (&self.stages, &state.frame, &mut self.upload);
-        let isovalue = frame.isovalues[0];
-        let clear = std::mem::take(&mut self.clear_cache);
-        state.clears_cache = clear;
-        let warm = !clear && self.active_isovalue == Some(isovalue);
-        rendering.samples.record_begin_frame(encoder, &stages.samples, clear);
-        if self.active_isovalue != Some(isovalue) {
-            let VolumeBuffers { ranges, masks, .. } = &self.buffers;
-            stages.activate.record(device, encoder, upload, ranges, masks, isovalue);
-            self.active_isovalue = Some(isovalue);
-        }
-        state.most_cells = self.records.schedule.most_cells();
-        state.first_misses = if warm { WARM_MISSES } else { 0 };
-        Self::choose_rays(&mut self.records, &self.options, state, clear);
-        let frame = &state.frame;
-        let params = state.params(&self.plan);
-        let mut shading = ShadingParams::new(&frame.options.shading, self.volume.world_from_index);
-        let fills = stages.infill.is_some() && frame.options.infill != Infill::Off;
-        if fills && frame.options.stop_at.is_none() {
-            shading = shading.filled();
-        }
-        let next = (&state.view, &params);
-        if frame.options.infill != Infill::Off || frame.options.guided {
-            let follows = self.shown_isovalue == Some(isovalue);
-            let look = infill::Look {
-                from_completeness: frame.options.stop_at.map_or(0.0, |stop| stop.0),
-                crisp: frame.options.crisp_infill,
-            };
-            rendering.record_infill_start(device, encoder, upload, stages, next, follows, look);
-        }
-        self.shown_isovalue = Some(isovalue);
-        let sampling = state.sampling(self.options.size);
-        let sampling = sampling.as_ref();
-        let (textures, view) = (&self.pictures.textures, (&params, &shading));
-        rendering.record_start(device, encoder, upload, stages, textures, view, sampling);
-        if let (Some(draw), Some(buffers)) = (&stages.draw, &self.pictures.draw) {
-            draw.record_params(device, encoder, upload, buffers, &state.view);
-        }
-    }
-
-    /// Chooses how many of a frame's rays its first pass casts, if the frame is held to a time.
-    fn choose_rays(
-        records: &mut PassRecords,
-        options: &RendererOptions,
-        state: &mut FrameState,
-        clear: bool,
-    ) {
-        let frame = &state.frame;
-        (state.foveation, state.choice) = (frame.options.foveation, None);
-        let Some(budget) = &mut records.budget else { return };
-        if clear {
-            budget.forget_cache();
-        }
-        if let (Some(target_ms), None) = (frame.options.target_ms, frame.options.foveation) {
-            let choice = budget.choose(&Request {
-                view: &state.view,
-                size: options.size,
-                isovalue: frame.isovalues[0],
-                look_ahead: frame.options.look_ahead,
-                fills: frame.options.infill != Infill::Off,
-                target_ms: target_ms.into(),
-            });
-            (state.foveation, state.choice) = (choice.foveation(), Some(choice));
-        }
-    }
-
     /// Records reading the pass's counters back.
     fn record_readback(
         &mut self,
@@ -460,31 +350,41 @@ impl ProgressiveIsoRenderer {
         begin: Instant,
         dispatches: u32,
     ) {
-        let (counters, filled, lists_at_start) = match &self.phase {
-            Phase::Rendering(rendering) => {
-                (rendering.counters(), rendering.filled(), rendering.lists_at_start())
-            }
-            _ => (Vec::new(), None, 0),
-        };
         let state = self.frame.as_ref().filter(|state| state.started);
+        let step = state.map_or(1, |state| state.step);
+        let (counters, filled, lists_at_start, rays) = match &self.phase {
+            Phase::Rendering(rendering) => {
+                let casting = rendering.casting(step);
+                let rays = casting.rays().plan().rays() as u32;
+                let counters = rendering.counters(casting);
+                (counters, casting.filled(), casting.lists_at_start(), rays)
+            }
+            _ => (Vec::new(), None, 0, 0),
+        };
         let (frame, pass, rounds) = state.map_or((0, 0, 0), |s| (s.number, s.passes, s.rounds));
         let most_cells = state.map_or(0, |state| state.most_cells);
         let pass_ms = state.map_or(0.0, |state| state.frame.options.pass_ms);
         let stop_at = state.and_then(|state| state.frame.options.stop_at).map(|stop| stop.0);
         let fills = state.is_some_and(|state| state.frame.options.infill != Infill::Off);
-        let lists_at_start = lists_at_start + state.map_or(0, FrameState::lists_between);
-        let foveated = state.is_some_and(|state| state.foveation.is_some());
+        let lists_at_start =
+            lists_at_start + state.map_or(0, |state| state.lists.saturating_sub(1));
+        let foveated = state.is_some_and(|state| state.sampling.is_some());
         let choice = state.and_then(|state| state.choice);
         let look_ahead = state.map_or(0, |state| state.look_ahead().blocks);
         let [width, height] = self.options.size;
         let cpu_ms = begin.elapsed().as_secs_f64() * 1e3;
         let pixels = width * height;
+        let cells = self.plan.macrocell.grid().last_cell().map(|cell| (cell + 1) as f32);
+        let diagonal_voxels = cells.iter().map(|n| n * n).sum::<f32>().sqrt();
         let info = PassInfo {
             frame,
             pass,
             rounds,
             lists_at_start,
             pixels,
+            rays,
+            step,
+            is_resumed: state.is_some_and(FrameState::is_resumed),
             foveated,
             choice,
             look_ahead,
@@ -492,6 +392,7 @@ impl ProgressiveIsoRenderer {
             pass_ms,
             stop_at,
             dispatches,
+            diagonal_voxels,
             begin,
             cpu_ms,
         };
@@ -563,10 +464,11 @@ impl ProgressiveIsoRenderer {
         &self.pictures.textures
     }
 
-    /// States of the current picture's rays, once the volume is loaded: for measuring.
+    /// States of the picture's rays, once the volume is loaded: for measuring. They are the current frame's, except after a first
+    /// pass whose [`PassReport::step`] is above 1.
     pub fn rays(&self) -> Option<&wavefront::RayBuffers> {
         match &self.phase {
-            Phase::Rendering(rendering) => Some(rendering.rays()),
+            Phase::Rendering(rendering) => Some(rendering.casting(1).rays()),
             _ => None,
         }
     }

@@ -24,6 +24,11 @@ pub struct PassReport {
     pub rays: u32,
     /// Pixels whose rays the frame has had cast so far: all, or those of the sampling mask of a foveated frame.
     pub sampled_rays: u32,
+    /// Pixels from one of the pass's rays to the next in both directions: 1, or 2 or 4 where the first pass of a frame that is
+    /// held to a time is a preview. Its pixels are those of the finished picture. What it does not know of the others, this
+    /// report has from it: `entered_rays` is an estimate, `active_rays` is what is not finished of that, at least 1, and
+    /// `open_depth_voxels` is the volume's diagonal.
+    pub step: u32,
     /// Share of the rays that the frame's first pass might cast: less than 1 where a frame is held to
     /// [`crate::FrameOptions::target_ms`].
     pub density: f32,
@@ -49,6 +54,8 @@ pub struct PassReport {
     pub open_depth_voxels: f32,
     /// Unfinished pixels that show a guess: see [`crate::Infill`].
     pub filled_pixels: u32,
+    /// Pixels that are final.
+    pub(crate) exact: u32,
     /// Whether the frame is as complete as [`crate::FrameOptions::stop_at`] asks for.
     pub(crate) stopped: bool,
     /// Resident blocks that rays used in this frame, once per round each. With `blocks_requested`,
@@ -112,7 +119,7 @@ impl PassReport {
     /// Pixels that are final.
     #[must_use]
     pub fn exact_pixels(&self) -> u32 {
-        self.rays - self.active_rays
+        self.exact
     }
 
     /// Whether the newest frame is as complete as [`crate::FrameOptions::stop_at`] asks for, so that the caller may

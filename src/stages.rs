@@ -1,15 +1,12 @@
 //! A scene's pipelines, and the memory that they work on.
 
 use gpu_primitives::memory::Ledger;
-use gpu_primitives::upload::UploadRing;
-use infill::{Guide, GuideBinds, GuideScene, InfillBuffers, Method, Weights};
+use infill::{Guide, Weights};
 use macrocell::{Activate, Masks, RangeBuffers};
-use wavefront::{
-    Draw, DrawBuffers, FrameParams, FrameView, OutputTextures, RayBuffers, Rays, Rounds, Samples,
-    SamplingParams, Scene, ShadingParams, Strategy,
-};
+use wavefront::{Draw, DrawBuffers, OutputTextures, Previews, Rays, Strategy};
 use zfp_gpu::Payload;
 
+use crate::casting::{Casting, Maker, Preview};
 use crate::samples::{SampleBuffers, SampleStages};
 use crate::{Error, RendererOptions, ScenePlan, wgpu};
 
@@ -22,14 +19,15 @@ pub(crate) struct Stages {
     pub(crate) strategy: Box<dyn Strategy>,
     pub(crate) draw: Option<Draw>,
     pub(crate) infill: Option<InfillStage>,
+    pub(crate) previews: Option<Previews>,
 }
 
 /// Pipelines and weights of in-fill.
 #[derive(Debug)]
 pub(crate) struct InfillStage {
     pub(crate) stage: infill::Infill,
-    weights: Option<&'static Weights>,
-    guide: Option<Guide>,
+    pub(crate) weights: Option<&'static Weights>,
+    pub(crate) guide: Option<Guide>,
 }
 
 /// The volume as it is needed all the time.
@@ -47,14 +45,12 @@ pub(crate) struct Pictures {
     pub(crate) draw: Option<DrawBuffers>,
 }
 
-/// What rays need, once the volume is loaded.
+/// What rendering needs, once the volume is loaded.
 #[derive(Debug)]
 pub(crate) struct Rendering {
     pub(crate) samples: SampleBuffers,
-    rays: RayBuffers,
-    rounds: Box<dyn Rounds>,
-    infill: Option<InfillBuffers>,
-    guide: Option<GuideBinds>,
+    full: Casting,
+    previews: Vec<Preview>,
 }
 
 impl Stages {
@@ -81,6 +77,8 @@ impl Stages {
                     .then(|| Guide::new(device, plan))
                     .flatten(),
             }),
+            previews: (!plan.previews.is_empty())
+                .then(|| Previews::new(device, plan.wavefront.outputs(), layout)),
         })
     }
 }
@@ -154,87 +152,24 @@ impl Rendering {
                 SampleBuffers::new(device, ledger, &stages.samples, &plan.samples, payload)?
             }
         };
-        let read = samples.samples();
-        let (wavefront, masks) = (&plan.wavefront, volume.masks.buffer());
-        let rays = RayBuffers::new(device, ledger, &stages.rays, wavefront, masks, read, textures);
-        let scene = Scene { rays: &rays, masks, samples: read };
-        let rounds = stages.strategy.bind(device, ledger, scene)?;
-        let scene = infill::Scene { rays: &rays, ranges: &volume.ranges, textures };
-        let infill = stages.infill.as_ref().map(|InfillStage { stage, weights, .. }| {
-            InfillBuffers::new(device, ledger, stage, scene, *weights)
-        });
-        let infill = infill.transpose()?;
-        let guide = stages.infill.as_ref().and_then(|infill| infill.guide.as_ref());
-        let guide = match (guide, &infill, read) {
-            (Some(guide), Some(buffers), Samples::Cached(cache)) => {
-                let cache = [cache.directory(), cache.state()];
-                let scene = GuideScene { rays: &rays, masks, ranges: &volume.ranges, cache };
-                Some(guide.bind(device, buffers, scene))
-            }
-            _ => None,
-        };
-        Ok(Self { samples, rays, rounds, infill, guide })
-    }
-
-    /// Records the first rays of a frame.
-    pub(crate) fn record_start(
-        &self,
-        device: &wgpu::Device,
-        encoder: &mut wgpu::CommandEncoder,
-        upload: &mut UploadRing,
-        stages: &Stages,
-        textures: &OutputTextures,
-        view: (&FrameParams, &ShadingParams),
-        sampling: Option<&SamplingParams>,
-    ) {
-        let rays = &self.rays;
-        stages.rays.record_start(device, encoder, upload, rays, textures, view, sampling);
-        self.rounds.record_start(encoder, &stages.rays, &self.rays);
-    }
-
-    /// Records that another pass of a foveated frame casts more rays.
-    pub(crate) fn record_mask(
-        &self,
-        device: &wgpu::Device,
-        encoder: &mut wgpu::CommandEncoder,
-        upload: &mut UploadRing,
-        stages: &Stages,
-        sampling: &SamplingParams,
-    ) {
-        stages.rays.record_mask(device, encoder, upload, &self.rays, sampling);
-    }
-
-    /// Records what in-fill keeps of the previous frame: before the new one starts.
-    pub(crate) fn record_infill_start(
-        &self,
-        device: &wgpu::Device,
-        encoder: &mut wgpu::CommandEncoder,
-        upload: &mut UploadRing,
-        stages: &Stages,
-        next: (&FrameView, &FrameParams),
-        follows: bool,
-        look: infill::Look,
-    ) {
-        if let (Some(InfillStage { stage, .. }), Some(buffers)) = (&stages.infill, &self.infill) {
-            stage.record_start(device, encoder, upload, buffers, next, follows, look);
+        let maker = Maker { device, ledger, stages, volume, samples: samples.samples() };
+        let full = maker.casting(&plan.wavefront, plan.infill.as_ref(), textures)?;
+        let mut previews: Vec<Preview> = Vec::new();
+        for plan in &plan.previews {
+            let Some(stage) = &stages.previews else { break };
+            previews.push(maker.preview(stage, plan, (&full, textures), previews.last())?);
         }
+        Ok(Self { samples, full, previews })
     }
 
-    /// Records filling the unfinished pixels.
-    pub(crate) fn record_fill(
-        &self,
-        encoder: &mut wgpu::CommandEncoder,
-        stages: &Stages,
-        method: Method,
-    ) {
-        if let (Some(InfillStage { stage, .. }), Some(buffers)) = (&stages.infill, &self.infill) {
-            stage.record_fill(encoder, buffers, method);
-        }
+    /// The rays of every `step`-th pixel in both directions: of the picture for 1, else of a preview.
+    pub(crate) fn casting(&self, step: u32) -> &Casting {
+        self.preview(step).map_or(&self.full, |preview| &preview.casting)
     }
 
-    /// Where the number of filled pixels is after a fill.
-    pub(crate) fn filled(&self) -> Option<(&wgpu::Buffer, u64, u64)> {
-        self.infill.as_ref().map(InfillBuffers::filled)
+    /// The preview of that many pixels.
+    pub(crate) fn preview(&self, step: u32) -> Option<&Preview> {
+        self.previews.iter().find(|preview| preview.step == step)
     }
 
     /// Records one round; `guided`: with requests up to where the coarse field is crossed.
@@ -242,35 +177,24 @@ impl Rendering {
         &self,
         encoder: &mut wgpu::CommandEncoder,
         stages: &Stages,
+        casting: &Casting,
         guided: bool,
     ) {
-        let guide = stages.infill.as_ref().and_then(|infill| infill.guide.as_ref());
-        let guide = guide.zip(self.guide.as_ref()).filter(|_| guided);
-        self.rounds.record_round(encoder, &stages.rays, &self.rays, &mut |encoder| {
-            if let Some((guide, binds)) = guide {
-                guide.record(encoder, binds, &self.rays);
-            }
+        casting.record_round(encoder, stages, guided, &mut |encoder| {
             self.samples.record_service(encoder, &stages.samples);
         });
     }
 
-    /// The rays' states.
-    pub(crate) fn rays(&self) -> &RayBuffers {
-        &self.rays
-    }
-
-    /// Lists of active rays made before the first round.
-    pub(crate) fn lists_at_start(&self) -> u32 {
-        self.rounds.lists_at_start()
-    }
-
     /// What is read back after a pass: parts (buffer, byte offset, bytes).
-    pub(crate) fn counters(&self) -> Vec<(&wgpu::Buffer, u64, u64)> {
+    pub(crate) fn counters<'a>(
+        &'a self,
+        casting: &'a Casting,
+    ) -> Vec<(&'a wgpu::Buffer, u64, u64)> {
         let (offset, bytes) = wavefront::Counters::BYTES;
-        let mut parts = vec![(self.rays.rays(), offset, bytes)];
+        let mut parts = vec![(casting.rays().rays(), offset, bytes)];
         if let Some(counters) = self.samples.counters() {
             parts.extend(counters);
-            parts.extend(self.rounds.statistics());
+            parts.extend(casting.statistics());
         }
         parts
     }

@@ -175,6 +175,8 @@ fn table(rows: &[Row]) -> String {
         "s",
         "target",
         "quality",
+        "PSNR",
+        "previews",
         "frames above",
         "excess",
         "RMSE above",
@@ -195,6 +197,8 @@ fn table(rows: &[Row]) -> String {
             row.seconds.to_string(),
             ms(row.target_ms),
             format!("{:.2}", row.quality),
+            row.psnr.map_or("-".into(), |psnr| format!("{psnr:.1}")),
+            format!("{} + {}", row.previews[0], row.previews[1]),
             row.frames_above.to_string(),
             ms(row.excess_ms),
             ms(row.rmse_above_ms),
@@ -210,6 +214,15 @@ fn table(rows: &[Row]) -> String {
     table.finish()
 }
 
+/// Mean of a mode's PSNR less last-frame adaptation's.
+fn psnr_more(rows: &[Row], mode: &str) -> Option<f64> {
+    let of = |mode: &str| -> Option<Vec<f64>> {
+        rows.iter().filter(|row| row.mode == mode).map(|row| row.psnr).collect()
+    };
+    let (own, last) = (of(mode)?, of("last frame")?);
+    Some(own.iter().zip(&last).map(|(own, last)| own - last).sum::<f64>() / own.len().max(1) as f64)
+}
+
 /// Every mode against last-frame adaptation, means over volumes and recordings.
 fn summary(rows: &[Row]) -> String {
     let heads = [
@@ -219,6 +232,7 @@ fn summary(rows: &[Row]) -> String {
         "frames above",
         "largest above",
         "quality",
+        "PSNR, dB more",
         "prediction error",
     ];
     let mut table = Table::new("Against the last frame's time", &heads, 1);
@@ -238,6 +252,7 @@ fn summary(rows: &[Row]) -> String {
             share(|row| row.frames_above as f64 / row.frames as f64),
             share(|row| row.largest_above_ms / row.target_ms),
             share(|row| row.quality),
+            psnr_more(rows, mode).map_or("-".into(), |more| format!("{more:+.1}")),
             format!("{:.0} %", 100.0 * mean(mode, |row| row.prediction_error.unwrap_or(f64::NAN))),
         ]);
     }

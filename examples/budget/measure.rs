@@ -3,8 +3,8 @@
 use std::time::Instant;
 
 use progressive_iso::{
-    BudgetMode, CompressedVolume, Frame, FrameOptions, Infill, InfillOptions, InfillSources,
-    ProgressiveIsoRenderer, RendererOptions,
+    BudgetMode, Capture, CompressedVolume, Frame, FrameOptions, Infill, InfillOptions,
+    InfillSources, ProgressiveIsoRenderer, RendererOptions,
 };
 use serde::Serialize;
 
@@ -12,6 +12,8 @@ use crate::sequence::View;
 use crate::support::{Failure, Gpu, median};
 
 const BUDGET_BYTES: u64 = 1 << 30;
+/// Every so many frames what is shown is compared with the finished picture.
+const COMPARED_EVERY: usize = 3;
 /// Frames after which predictions count.
 const LEARNING_FRAMES: usize = 20;
 
@@ -26,8 +28,12 @@ pub const MODES: [(&str, BudgetMode); 4] = [
 #[derive(Clone, Copy, Debug)]
 pub struct Shown {
     pub ms: f64,
-    /// Finished share of the rays that enter the volume.
+    /// Finished share of the rays that enter the volume; those that a preview has no rays for are not.
     quality: f64,
+    /// Pixels from one ray to the next in both directions.
+    step: u32,
+    /// Mean squared difference to the finished picture's colours, if it was measured.
+    error: Option<f64>,
     predicted_ms: Option<f64>,
     budget_ms: f64,
 }
@@ -40,8 +46,13 @@ pub struct Row {
     pub mode: &'static str,
     pub target_ms: f64,
     pub frames: usize,
-    /// Mean finished share of the rays that enter the volume.
+    /// Mean finished share of the rays that enter the volume; those that a preview has no rays for are not.
     pub quality: f64,
+    /// Of the shown pictures against the finished ones, in dB: of the mean squared error over every third frame; null without any
+    /// error.
+    pub psnr: Option<f64>,
+    /// Frames that have rays of every second and of every fourth pixel in both directions alone.
+    pub previews: [usize; 2],
     pub rmse_ms: f64,
     pub frames_above: usize,
     /// Over all frames: what each took longer than the target, 0 for those that did not.
@@ -94,6 +105,7 @@ fn renderer(
         budget_bytes: BUDGET_BYTES,
         infill: Some(InfillOptions { sources, ..Default::default() }),
         budget: Some(mode),
+        capture: true,
         ..Default::default()
     };
     let mut renderer =
@@ -131,6 +143,8 @@ fn show(
     Ok(Shown {
         ms,
         quality: report.completeness(),
+        step: report.step,
+        error: None,
         predicted_ms: report.predicted_ms,
         budget_ms: report.budget_ms,
     })
@@ -169,8 +183,36 @@ pub fn run(
             let passes = if mode == BudgetMode::TwoPass { 2 } else { 1 };
             shown.push(show(gpu, renderer, &frame, passes)?);
         }
+        if shown[0].len() % COMPARED_EVERY == 0 {
+            compare(&renderers, &mut shown)?;
+        }
     }
     Ok((shown, target_ms))
+}
+
+/// Compares what is shown with the finished picture, which the first mode shows.
+fn compare(
+    renderers: &[(Gpu, ProgressiveIsoRenderer)],
+    shown: &mut [Vec<Shown>],
+) -> Result<(), Failure> {
+    let mut finished: Option<Capture> = None;
+    for ((gpu, renderer), shown) in renderers.iter().zip(shown) {
+        let picture = renderer.capture_blocking(&gpu.device, &gpu.queue)?;
+        let error = mean_squared_error(finished.as_ref().unwrap_or(&picture), &picture);
+        if let Some(newest) = shown.last_mut() {
+            newest.error = Some(error);
+        }
+        finished.get_or_insert(picture);
+    }
+    Ok(())
+}
+
+/// Of the colours without alpha, 0 to 255.
+fn mean_squared_error(a: &Capture, b: &Capture) -> f64 {
+    let pixels = a.color.chunks_exact(4).zip(b.color.chunks_exact(4));
+    let squares =
+        pixels.flat_map(|(a, b)| (0..3).map(|i| (f64::from(a[i]) - f64::from(b[i])).powi(2)));
+    squares.sum::<f64>() / (3 * a.color.len() / 4).max(1) as f64
 }
 
 impl Row {
@@ -201,6 +243,12 @@ impl Row {
             target_ms,
             frames: shown.len(),
             quality: mean(|shown| shown.quality),
+            psnr: {
+                let errors: Vec<f64> = shown.iter().filter_map(|shown| shown.error).collect();
+                let error = errors.iter().sum::<f64>() / errors.len().max(1) as f64;
+                (error > 0.0).then(|| 10.0 * (255.0 * 255.0 / error).log10())
+            },
+            previews: [2, 4].map(|step| shown.iter().filter(|shown| shown.step == step).count()),
             rmse_ms: rms(errors().collect()),
             frames_above: errors().filter(|e| *e > 0.0).count(),
             excess_ms: rms(errors().map(|e| e.max(0.0)).collect()),

@@ -29,7 +29,6 @@ pub enum Method {
 /// The kernels. Immutable; used with any number of pictures.
 #[derive(Debug)]
 pub struct Infill {
-    plan: InfillPlan,
     scatter: Option<Kernel>,
     gate: Kernel,
     mark: Kernel,
@@ -81,6 +80,8 @@ struct History {
     frame: Buffer,
     scatter_params: Buffer,
     scatter: wgpu::BindGroup,
+    /// Workgroups of the scatter.
+    groups: u64,
 }
 
 #[derive(Debug)]
@@ -104,12 +105,11 @@ pub struct Scene<'a> {
 }
 
 impl Infill {
-    /// Makes the pipelines for scenes with such a plan.
+    /// Makes the pipelines for scenes with such a plan, whatever the picture's size.
     pub fn new(device: &wgpu::Device, plan: &InfillPlan) -> Self {
         let sources = plan.sources();
         let make = |source: KernelSource| source.kernel(device);
         Self {
-            plan: plan.clone(),
             scatter: sources.history.then(|| make(kernels::scatter())),
             gate: make(kernels::gate()),
             mark: make(kernels::mark()),
@@ -175,9 +175,8 @@ impl Infill {
         let scatter = ScatterParams { column, row, w, depth };
         upload.write(device, encoder, &history.frame, 0, bytemuck::bytes_of(params));
         upload.write(device, encoder, &history.scatter_params, 0, bytemuck::bytes_of(&scatter));
-        let numbers = wavefront::RayOrder::new(buffers.plan.size()).numbers();
         let mut pass = begin_pass(encoder, "infill.scatter");
-        kernel.dispatch(&mut pass, &history.scatter, numbers.div_ceil(RAYS_PER_GROUP));
+        kernel.dispatch(&mut pass, &history.scatter, history.groups);
     }
 
     /// Records filling the holes of the picture as it is, once it is complete enough. Until then and where no ray is
@@ -230,7 +229,7 @@ impl Infill {
 }
 
 impl InfillBuffers {
-    /// Allocates and binds what one picture needs.
+    /// Allocates and binds what one picture needs. `plan` differs from the stage's in nothing but the picture's size.
     ///
     /// # Errors
     /// If the textures lack depth or normals, or the plan has a network and there are no weights.
@@ -238,10 +237,11 @@ impl InfillBuffers {
         device: &wgpu::Device,
         ledger: &Ledger,
         stage: &Infill,
+        plan: &InfillPlan,
         scene: Scene<'_>,
         weights: Option<&Weights>,
     ) -> Result<Self, Error> {
-        Maker { device, ledger, stage, scene }.make(weights)
+        Maker { device, ledger, stage, plan, scene }.make(weights)
     }
 
     /// Where the number of filled pixels is after a fill: buffer, byte offset, bytes.
@@ -271,6 +271,7 @@ struct Maker<'a> {
     device: &'a wgpu::Device,
     ledger: &'a Ledger,
     stage: &'a Infill,
+    plan: &'a InfillPlan,
     scene: Scene<'a>,
 }
 
@@ -317,7 +318,7 @@ impl Maker<'_> {
     }
 
     fn make(&self, weights: Option<&Weights>) -> Result<InfillBuffers, Error> {
-        let plan = &self.stage.plan;
+        let plan = self.plan;
         let Scene { rays, ranges, textures } = self.scene;
         let [depth, normals] = self.views()?;
         let tiles = self.storage("infill.tiles", plan.tile_bytes());
@@ -421,7 +422,7 @@ impl Maker<'_> {
     ) -> Option<History> {
         let kernel = self.stage.scatter.as_ref()?;
         let rays = self.scene.rays;
-        let keys = self.storage("infill.history", self.stage.plan.history_bytes());
+        let keys = self.storage("infill.history", self.plan.history_bytes());
         let frame = self.uniform("infill.history.frame", FrameParams::BYTES);
         let bytes = size_of::<ScatterParams>() as u64;
         let scatter_params = self.uniform("infill.history.scatter", bytes);
@@ -437,11 +438,12 @@ impl Maker<'_> {
             normals,
         ];
         let scatter = kernel.bind(self.device, "infill.scatter", &resources);
-        Some(History { keys, frame, scatter_params, scatter })
+        let groups = rays.plan().numbers().div_ceil(RAYS_PER_GROUP);
+        Some(History { keys, frame, scatter_params, scatter, groups })
     }
 
     fn maps(&self, weights: &Weights) -> Maps {
-        let plan = &self.stage.plan;
+        let plan = self.plan;
         let packed = PackedWeights::new(weights);
         let words: Vec<u16> = packed.vectors.iter().flatten().map(|w| w.to_bits()).collect();
         let (category, usage) = (Category::Params, wgpu::BufferUsages::STORAGE);

@@ -40,6 +40,7 @@ impl ProgressiveIsoRenderer {
         if pictures
             || plan.infill_options != self.plan.infill_options
             || options.blue_noise() != self.options.blue_noise()
+            || plan.previews.is_empty() != self.plan.previews.is_empty()
             || (layout, strategy) != (self.plan.samples.layout(), self.plan.strategy)
         {
             self.stages = self
@@ -84,7 +85,7 @@ impl ProgressiveIsoRenderer {
 
     /// Frees the memory of the rays and, unless they are kept, of the samples.
     fn release_rays(&mut self, keep_samples: bool) {
-        self.shown_isovalue = None;
+        self.shown.clear();
         let samples = match std::mem::replace(&mut self.phase, Phase::Loaded(None)) {
             Phase::Loading(loader) => {
                 self.phase = Phase::Loading(loader);

@@ -1,8 +1,8 @@
 //! The state of the current frame.
 
-use wavefront::{Foveation, FrameParams, FrameView, LookAhead, SamplingParams};
+use wavefront::{FrameParams, FrameView, LookAhead, SamplingParams};
 
-use crate::budget::Choice;
+use crate::budget::{Choice, Sampling};
 use crate::{Frame, ScenePlan};
 
 /// A frame and how far it is.
@@ -22,17 +22,34 @@ pub(super) struct FrameState {
     pub(super) passes: u32,
     pub(super) rounds: u32,
     /// Which rays its passes may cast, once it has started; `None`: all.
-    pub(super) foveation: Option<Foveation>,
+    pub(super) sampling: Option<Sampling>,
     /// What its setting was chosen by, if it is held to a time.
     pub(super) choice: Option<Choice>,
+    /// Pixels from one of the newest rays to the next in both directions, and of these rays from one of those of a preview that
+    /// they go on from to the next; 1 for all.
+    pub(super) step: u32,
+    pub(super) resumed_step: u32,
+    /// First lists of rays made so far, by the start, by every mask, and when it went on from a preview.
+    pub(super) lists: u32,
 }
 
 impl FrameState {
     /// What the next pass adds to the sampling mask of a foveated frame, if anything.
-    pub(super) fn sampling(&self, size: [u32; 2]) -> Option<SamplingParams> {
-        let foveation = self.foveation?;
-        let adds = self.passes < foveation.passes;
-        adds.then(|| SamplingParams::new(&foveation, size, self.number, self.passes))
+    pub(super) fn sampling(&self) -> Option<SamplingParams> {
+        let Sampling { foveation, lattice } = self.sampling?;
+        let size = self.ray_view().ray_size();
+        let params = SamplingParams::new(&foveation, size, self.number, self.passes);
+        (self.passes < foveation.passes).then(|| params.with_lattice(lattice))
+    }
+
+    /// Whether its rays go on from a preview, which unfinished pixels show.
+    pub(super) fn is_resumed(&self) -> bool {
+        self.resumed_step > 1
+    }
+
+    /// The view of the rays that are cast.
+    pub(super) fn ray_view(&self) -> FrameView {
+        self.view.preview(self.step)
     }
 
     /// How far its rays look ahead: in its first pass as was chosen.
@@ -46,13 +63,8 @@ impl FrameState {
 
     pub(super) fn params(&self, plan: &ScenePlan) -> FrameParams {
         let (grid, lru) = (plan.macrocell.grid(), plan.samples.params());
-        let params = self.view.params(grid, lru, self.frame.isovalues[0], self.look_ahead());
-        params.with_most_cells(self.most_cells)
-    }
-
-    /// Lists of rays made before the first rounds of the passes after the first, so far.
-    pub(super) fn lists_between(&self) -> u32 {
-        let passes = self.foveation.map_or(1, |foveation| foveation.passes);
-        self.passes.clamp(1, passes) - 1
+        let view = self.ray_view();
+        let params = view.params(grid, lru, self.frame.isovalues[0], self.look_ahead());
+        params.with_most_cells(self.most_cells).after_preview(self.resumed_step)
     }
 }

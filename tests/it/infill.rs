@@ -8,9 +8,9 @@ use infill::cpu::reproject::{self, EMPTY, OldHit};
 use infill::{Sources, Weights};
 use macrocell::Grid;
 use progressive_iso::{
-    BlockSortedOptions, BlueNoise, Camera, Capture, Completeness, Error, Frame, FrameOptions,
-    FrameView, Infill, InfillOptions, InfillWhen, PassReport, PixelStatus, ProgressiveIsoRenderer,
-    RendererOptions, Residency, TraversalStrategy,
+    BlockSortedOptions, BlueNoise, Camera, Capture, Completeness, Error, Foveation, Frame,
+    FrameOptions, FrameView, Infill, InfillOptions, InfillWhen, PassReport, PixelStatus,
+    ProgressiveIsoRenderer, RendererOptions, Residency, TraversalStrategy,
 };
 use wavefront::cpu::frame::{FrameRay, RayStates};
 use wavefront::cpu::shading;
@@ -564,5 +564,35 @@ fn guided_requests_change_no_bit_of_the_finished_picture() {
             // The guide does ask for more, unless the slots are too few for that.
             assert!(slots < 1000 || plain.1 != guided.1);
         }
+    }
+}
+
+#[test]
+fn a_resized_picture_is_filled_as_one_of_that_size() {
+    let gpu = Gpu::new();
+    let scene = Scene::generated("turbulence", [70, 66, 61], 8.0);
+    let foveation = Some(BlueNoise::tiles());
+    let of = |size| {
+        let sources = Sources { history: false, ..Sources::default() };
+        let options = with_infill(InfillOptions { sources, ..Default::default() });
+        let residency = Residency::Full;
+        gpu.renderer(&scene, RendererOptions { size, foveation, residency, ..options })
+    };
+    let mut frame = frame_with(&scene, 20.0, Infill::Classical);
+    frame.options.foveation = Some(Foveation::default());
+    let shown = |renderer: &mut ProgressiveIsoRenderer| {
+        renderer.set_frame(&frame).unwrap();
+        let (device, queue) = (&gpu.device, &gpu.queue);
+        renderer.render_to_completion(device, queue, |_, report| report.pass == 0).unwrap();
+        capture(&gpu, renderer).color
+    };
+    // The third frame, whose mask another one does not have; changing the size starts a frame.
+    let mut unchanged = of(SIZE);
+    let expected = [(); 3].map(|()| shown(&mut unchanged))[2].clone();
+    for other in [[SIZE[0] / 2, SIZE[1] / 2], [2 * SIZE[0], SIZE[1] + 7]] {
+        let mut resized = of(other);
+        assert_ne!(shown(&mut resized), expected);
+        resized.resize(&gpu.device, SIZE).unwrap();
+        assert_eq!(shown(&mut resized), expected, "{other:?}");
     }
 }

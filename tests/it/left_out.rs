@@ -3,8 +3,8 @@
 use gpu_primitives::kernel::dispatches_recorded;
 use gpu_testkit::gpu;
 use progressive_iso::{
-    BlockSortedOptions, BlueNoise, Category, DrawTarget, Outputs, PassReport,
-    ProgressiveIsoRenderer, RendererOptions, TraversalStrategy, wgpu,
+    BlockSortedOptions, BlueNoise, BudgetMode, Category, DrawTarget, InfillOptions, Outputs,
+    PassReport, ProgressiveIsoRenderer, RendererOptions, TraversalStrategy, wgpu,
 };
 
 use crate::support::{Scene, options};
@@ -120,13 +120,38 @@ fn foveation_is_left_out_unless_asked_for() {
     assert_eq!(part_bytes(&scene, without, "foveation"), (false, 0));
     let bytes = part_bytes(&scene, with, "foveation").1;
     // The tiles, a bit for each of 64x32 rays, a uniform and arguments.
-    assert_eq!(bytes, 128 * 1024 + 64 * 32 / 8 + 32 + 16);
+    assert_eq!(bytes, 128 * 1024 + 64 * 32 / 8 + 40 + 16);
     let slots = Some(100);
     let [without, with] =
         [without, with].map(|o| cost(&scene, RendererOptions { most_slots: slots, ..o }));
     assert_eq!(without.compute_pipelines + 1, with.compute_pipelines);
     assert_eq!(without.bytes + bytes, with.bytes);
     // A frame without it pays nothing for the plan.
+    assert_eq!(without.dispatches, with.dispatches);
+}
+
+#[test]
+fn previews_are_left_out_unless_a_frame_budget_has_them() {
+    let scene = Scene::generated("gyroid", [20, 21, 22], 8.0);
+    let infill = Some(InfillOptions::default());
+    let of = |budget, infill| RendererOptions {
+        budget: Some(budget),
+        infill,
+        most_slots: Some(100),
+        ..options([40, 30])
+    };
+    let without = of(BudgetMode::Fixed, infill);
+    for none in [of(BudgetMode::TwoPass, infill), of(BudgetMode::Predicted, None)] {
+        assert_eq!(part_bytes(&scene, none, "previews"), (false, 0));
+    }
+    assert_eq!(part_bytes(&scene, without, "previews"), (false, 0));
+    let with = of(BudgetMode::Predicted, infill);
+    let bytes = part_bytes(&scene, with, "previews").1;
+    assert!(bytes > 0);
+    let [without, with] = [without, with].map(|options| cost(&scene, options));
+    assert_eq!(without.compute_pipelines + 2, with.compute_pipelines);
+    assert_eq!(without.bytes + bytes, with.bytes);
+    // A frame without one pays nothing for the plan.
     assert_eq!(without.dispatches, with.dispatches);
 }
 

@@ -18,6 +18,7 @@ mod invariance;
 mod left_out;
 mod memory;
 mod open_depth;
+mod previews;
 mod published;
 mod reference;
 mod residency;

@@ -1,7 +1,7 @@
 //! Writes the composed text of every kernel of the crate, with all outputs and pages of slots, to a
 //! folder, for tools that read WGSL: `cargo run -p wavefront --all-features --example write_shaders -- FOLDER`.
 
-use wavefront::{Outputs, Rays, RunAhead, SampleLayout};
+use wavefront::{Outputs, Previews, Rays, RunAhead, SampleLayout};
 
 fn main() -> std::io::Result<()> {
     let folder = std::path::PathBuf::from(std::env::args_os().nth(1).unwrap_or_default());
@@ -13,6 +13,7 @@ fn main() -> std::io::Result<()> {
         sources.extend(Rays::sources(outputs, samples).map(|source| (name, source)));
         let foveated = Rays::foveation_sources(samples);
         sources.extend(foveated.map(|source| ("foveated", source)));
+        sources.extend(Previews::sources(outputs, samples).map(|source| ("preview", source)));
         sources.extend(RunAhead::sources(samples).into_iter().map(|source| (name, source)));
     }
     #[cfg(feature = "block-sorted")]

@@ -10,6 +10,8 @@ struct SamplingParams {
     base_density: f32,
     slice: u32, // word of the first rank of the frame's slice
     draws: u32, // passes that have drawn after this one; 0 for all rays
+    lattice_level: u32, // log2 of the pixels from one ray of a lattice that is cast in any case to the next; 0 for none
+    pad0: u32,
 }
 
 @group(0) @binding(0) var<uniform> frame: FrameParams;
@@ -38,20 +40,24 @@ fn is_drawn(ranks: vec4<u32>, fovea: vec4<f32>) -> vec4<bool> {
     return (above > f32(TILE_RANKS) * left) | vec4<bool>(sampling.draws == 0u);
 }
 
-// Bits of a word's rays that the pass draws, none of them outside the picture.
+// Bits of a word's rays that the pass draws or the lattice has, none of them outside the picture.
 fn draw_word(number: u32, zero: u32) -> u32 {
     let corner = frame_pixel(frame, number);
     let rows = vec4<u32>(corner.y) + vec4<u32>(0u, 1u, 2u, 3u);
     let is_inside = rows < vec4<u32>(frame.height);
     let row_fovea = fovea(rows, 1u);
     let row_words = vec4<u32>(sampling.slice) + (TILE_EDGE / 2u) * (rows % vec4<u32>(TILE_EDGE));
+    // The lattice has rows 0 and 2 and all even columns, or row 0 and columns 0 and 4.
+    let level = sampling.lattice_level;
+    let lattice_rows = vec4<bool>(level > 0u, false, level == 1u, false);
     var bits = 0u;
     for (var column = 0u; column < WORD_COLUMNS + zero; column += 2u) {
         let columns = vec2<u32>(corner.x + column) + vec2<u32>(0u, 1u);
         let column_fovea = fovea(columns.xyxy, 0u);
         let words = row_words + vec4<u32>(columns.x % TILE_EDGE / 2u);
         let ranks = vec4<u32>(tiles[words.x], tiles[words.y], tiles[words.z], tiles[words.w]);
-        let even = is_drawn(ranks & vec4<u32>(0xffffu), row_fovea * column_fovea.x);
+        let lattice = lattice_rows & vec4<bool>(level == 1u || column % 4u == 0u);
+        let even = lattice | is_drawn(ranks & vec4<u32>(0xffffu), row_fovea * column_fovea.x);
         let odd = is_drawn(ranks >> vec4<u32>(16u), row_fovea * column_fovea.y);
         bits |= word_bits(even & is_inside & vec4<bool>(columns.x < frame.width), column);
         bits |= word_bits(odd & is_inside & vec4<bool>(columns.y < frame.width), column + 1u);

@@ -1,5 +1,6 @@
 // Starts a frame: a bit for every ray that may hit something. The pictures, unfinished everywhere, get their background where
-// no ray has anything to hit, unless they have its colour already.
+// no ray has anything to hit, unless they have its colour already. With RESUME, the frame goes on from a preview: rays
+// that this has finished get no bit.
 #import frame
 #import indirect
 #import macrocell_skip
@@ -10,7 +11,10 @@
 @group(0) @binding(1) var<uniform> shading: ShadingParams;
 @group(0) @binding(2) var<storage, read_write> rays: array<atomic<u32>>;
 @group(0) @binding(3) var<storage, read> masks: array<vec2<u32>>;
-@group(0) @binding(4) var color_out: texture_storage_2d<rgba8unorm, write>;
+#ifdef RESUME
+@group(0) @binding(4) var<storage, read> preview: array<u32>; // the preview's rays
+#endif
+@group(0) @binding(COLOR_BINDING) var color_out: texture_storage_2d<rgba8unorm, write>;
 #ifdef OUTPUT_DEPTH
 @group(0) @binding(DEPTH_BINDING) var depth_out: texture_storage_2d<r32float, write>;
 #endif
@@ -74,6 +78,19 @@ fn start(pixel: vec2<u32>, lines: FrameRays, volume: DdaBox, box: DdaBox) -> vec
     return vec2<u32>(u32(meets(ray, volume)), 0u);
 }
 
+#ifdef RESUME
+// A word's bits without those of rays that the preview has finished.
+fn without_finished(number: u32, bits: u32) -> u32 {
+    let shift = 2u * frame.preview_level;
+    let first = number >> shift;
+    let word = preview[RAYS_HEADER + (frame.ray_numbers >> shift) + (first >> 5u)] >> (first & 31u);
+    // Of every fourth ray or of every 16th.
+    let fourths = frame_spread_bits(vec2<u32>(frame_spread_bits(vec2<u32>(word & 255u)).x)).x;
+    let waiting = select(fourths, (word & 1u) | ((word & 2u) << 15u), frame.preview_level == 2u);
+    return bits & (waiting | ~frame_preview_bits(frame.preview_level));
+}
+#endif
+
 fn write_header(box: DdaBox) {
     atomicStore(&rays[RAYS_ACTIVE], 1u);
     atomicStore(&rays[RAYS_LISTED], 1u); // the first list is to be made
@@ -83,10 +100,30 @@ fn write_header(box: DdaBox) {
     }
 }
 
+// Whether there is anything to do for a word's pixels: rays that may meet the volume, or something to write.
+fn may_start(corner: vec2<u32>) -> bool {
+#ifdef OUTPUT_STATUS
+    return true;
+#else
+#ifdef RESUME
+    // Beside the volume, colours between its pixels and the background's may be left from the preview.
+    let margin = 4u;
+    let low = max(corner, vec2<u32>(margin)) - vec2<u32>(margin);
+    return frame_may_meet(frame, low, vec2<u32>(8u, 4u) + vec2<u32>(2u * margin));
+#else
+    // `|`, as above.
+    return (shading.start_columns > 0u) | frame_may_meet(frame, corner, vec2<u32>(8u, 4u));
+#endif
+#endif
+}
+
 // Starts the rays of a word: (how many enter the volume, bits of those that may hit something).
 fn start_word(number: u32, box: DdaBox, zero: u32) -> vec2<u32> {
     let volume = DdaBox(vec3<i32>(0), frame.grid.last_cell + vec3<i32>(i32(zero)));
     let corner = frame_pixel(frame, number);
+    if (!may_start(corner)) {
+        return vec2<u32>(0u);
+    }
     let lines = frame_rays(frame);
     let size = vec2<u32>(frame.width, frame.height);
     var counts = vec2<u32>(0u);
@@ -124,6 +161,9 @@ fn main(
         if (!tile_inside(lane)) {
             counts = start_word(number, box, zero);
         }
+#ifdef RESUME
+        counts.y = without_finished(number, counts.y);
+#endif
         atomicStore(&rays[frame_active_word(frame, number)], counts.y);
         atomicAdd(&entered, counts.x);
     }

@@ -137,6 +137,8 @@ pub struct SamplingParams {
     pub(crate) slice: u32,
     /// Passes that have drawn after this one; 0 for all rays.
     pub(crate) draws: u32,
+    pub(crate) lattice_level: u32,
+    pub(crate) pad0: u32,
 }
 
 impl SamplingParams {
@@ -154,7 +156,15 @@ impl SamplingParams {
             base_density,
             slice: (frame % u64::from(BlueNoise::SLICES)) as u32 * (BlueNoise::RANKS / 2),
             draws: if pass + 1 < passes { pass + 1 } else { 0 },
+            lattice_level: 0,
+            pad0: 0,
         }
+    }
+
+    /// The same with every `step`-th pixel in both directions, whatever its value of blue noise: 1 for none, 2 or 4.
+    #[must_use]
+    pub fn with_lattice(self, step: u32) -> Self {
+        Self { lattice_level: step.clamp(1, 4).ilog2(), ..self }
     }
 }
 

@@ -67,6 +67,11 @@ pub struct FrameParams {
     pub(crate) shift_z: u32,
     pub(crate) shift_misses: u32,
     pub(crate) most_cells: u32,
+    pub(crate) middle: [f32; 2],
+    pub(crate) step: f32,
+    pub(crate) preview_level: u32,
+    pub(crate) volume_low: [u32; 2],
+    pub(crate) volume_end: [u32; 2],
     pub(crate) grid: GridParams,
     pub(crate) lru: LruParams,
 }
@@ -96,6 +101,12 @@ impl FrameParams {
     pub fn with_most_cells(self, most_cells: u32) -> Self {
         Self { most_cells: most_cells.min(Self::MOST_CELLS), ..self }
     }
+
+    /// The frame goes on from a preview of every `step`-th pixel, see [`crate::Previews::record_resume`]; 1 for none.
+    #[must_use]
+    pub fn after_preview(self, step: u32) -> Self {
+        Self { preview_level: step.max(1).ilog2(), ..self }
+    }
 }
 
 /// How many blocks stopped rays of `RunAhead` request.
@@ -117,7 +128,9 @@ pub(crate) const PARAMS_BYTES: u64 = size_of::<FrameParams>() as u64;
 /// The geometry of one frame in f64; rays are affine in the pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrameView {
+    /// Size of the picture, and pixels of it from one ray to the next.
     size: [u32; 2],
+    step: u32,
     /// Index-space start of the central ray and its change per pixel.
     origin: [DVec3; 3],
     /// Index-space direction per unit of view depth of the central ray and its change per pixel.
@@ -177,6 +190,7 @@ impl FrameView {
         };
         Ok(Self {
             size,
+            step: 1,
             origin: per_pixel([start(0), start(1), start(2)]),
             direction: per_pixel([along(0), along(1), along(2)]),
             start_depth,
@@ -185,6 +199,18 @@ impl FrameView {
             base,
             slope,
         })
+    }
+
+    /// The view of a preview: its ray (x, y) is that of the picture's pixel (step x, step y), bit for bit. `step` is a
+    /// power of two.
+    #[must_use]
+    pub fn preview(&self, step: u32) -> Self {
+        Self { step: step.max(1), ..*self }
+    }
+
+    /// Rays in a row and in a column.
+    pub fn ray_size(&self) -> [u32; 2] {
+        preview_size(self.size, self.step)
     }
 
     /// The uniform for the kernels.
@@ -199,13 +225,16 @@ impl FrameView {
         let LookAhead { blocks: look_ahead, first_misses } = look_ahead;
         let narrow = |v: DVec3| v.as_vec3().to_array();
         let order = RayOrder::new(self.size);
+        let order = order.preview(self.step).unwrap_or(order);
+        let [width, height] = self.ray_size();
+        let [volume_low, volume_end] = self.volume_pixels(grid.last_cell());
         FrameParams {
             origin: narrow(self.origin[0]),
             isovalue,
             origin_dx: narrow(self.origin[1]),
-            width: self.size[0],
+            width,
             origin_dy: narrow(self.origin[2]),
-            height: self.size[1],
+            height,
             direction: narrow(self.direction[0]),
             start_depth: self.start_depth as f32,
             direction_dx: narrow(self.direction[1]),
@@ -214,12 +243,17 @@ impl FrameView {
             ray_numbers: order.numbers() as u32,
             ray_level: order.level(),
             ray_columns: order.columns(),
-            list_capacity: list_capacity(self.size) as u32,
+            list_capacity: list_capacity([width, height]) as u32,
             first_misses,
             shift_y,
             shift_z,
             shift_misses,
             most_cells: FrameParams::MOST_CELLS,
+            middle: self.size.map(|s| 0.5 * s as f32),
+            step: self.step as f32,
+            preview_level: 0,
+            volume_low,
+            volume_end,
             grid: GridParams::new(grid),
             lru,
         }
@@ -228,8 +262,8 @@ impl FrameView {
     /// The ray through the centre of pixel (x, y), row 0 on top: start in index space and unit
     /// direction, in f64, and the view depth gained per voxel.
     pub fn ray(&self, pixel: [u32; 2]) -> ([f64; 3], [f64; 3], f64) {
-        let x = f64::from(pixel[0]) + 0.5 - f64::from(self.size[0]) / 2.0;
-        let y = f64::from(pixel[1]) + 0.5 - f64::from(self.size[1]) / 2.0;
+        let place = pixel.map(|p| f64::from(p) * f64::from(self.step) + 0.5);
+        let [x, y] = [0, 1].map(|a| place[a] - f64::from(self.size[a]) / 2.0);
         let at = |v: &[DVec3; 3]| v[0] + v[1] * x + v[2] * y;
         let direction = at(&self.direction);
         let voxels_per_depth = direction.length();
@@ -242,15 +276,55 @@ impl FrameView {
         self.start_depth
     }
 
+    /// Pixels that may have a ray that meets the volume, whose cells end at `last_cell`: the first ones in a row and in a
+    /// column, and those after the last ones.
+    fn volume_pixels(&self, last_cell: [i32; 3]) -> [[u32; 2]; 2] {
+        let size = self.ray_size();
+        let rows = self.pixel_rows();
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        let mut signs = [false; 2];
+        for corner in 0..8 {
+            // A voxel more on every side: rounding moves a ray's crossing by less.
+            let at = |axis: usize| {
+                if corner >> axis & 1 == 0 { -1.0 } else { f64::from(last_cell[axis]) + 2.0 }
+            };
+            let p = DVec4::new(at(0), at(1), at(2), 1.0);
+            let w = rows[2].dot(p);
+            signs[usize::from(w > 0.0)] = true;
+            for axis in 0..2 {
+                let place = rows[axis].dot(p) / w;
+                // Behind the eye's plane, or in it.
+                let is_usable = place.is_finite() && w != 0.0;
+                low[axis] = low[axis].min(if is_usable { place } else { f64::NEG_INFINITY });
+                high[axis] = high[axis].max(if is_usable { place } else { f64::INFINITY });
+            }
+        }
+        if signs[0] && signs[1] {
+            // The eye's plane cuts the volume, so it may be anywhere.
+            return [[0; 2], size];
+        }
+        // A pixel more on every side, since w is next to nothing where the volume comes near the eye's plane.
+        let first = |axis: usize| (low[axis] - 2.0).clamp(0.0, f64::from(size[axis])) as u32;
+        let end = |axis: usize| (high[axis] + 2.0).clamp(0.0, f64::from(size[axis])).ceil() as u32;
+        [[first(0), first(1)], [end(0), end(1)]]
+    }
+
     /// Rows that take an index-space position (x, y, z, 1) to (column * w, row * w, w, view depth): its place in
-    /// the picture in pixels, whose centres lie at halves.
+    /// the picture, or the preview, in pixels, whose centres lie at halves.
     pub fn pixel_from_index(&self) -> [[f32; 4]; 4] {
+        self.pixel_rows().map(|v| v.as_vec4().to_array())
+    }
+
+    fn pixel_rows(&self) -> [DVec4; 4] {
         let clip = (self.clip_from_view * self.view_from_index).transpose();
-        let [width, height] = self.size.map(f64::from);
-        let column = (clip.x_axis + clip.w_axis) * (0.5 * width);
-        let row = (clip.w_axis - clip.y_axis) * (0.5 * height);
+        let step = f64::from(self.step);
+        let [width, height] = self.size.map(|s| f64::from(s) / step);
+        // The first ray's pixel has its centre at a half of the picture's pixels, and of the preview's.
+        let first = clip.w_axis * (0.5 - 0.5 / step);
+        let column = (clip.x_axis + clip.w_axis) * (0.5 * width) + first;
+        let row = (clip.w_axis - clip.y_axis) * (0.5 * height) + first;
         let depth = -self.view_from_index.row(2);
-        [column, row, clip.w_axis, depth].map(|v| v.as_vec4().to_array())
+        [column, row, clip.w_axis, depth]
     }
 
     /// Clip-space z and w for a pixel at view depth d: (z0 + d z1, w0 + d w1), each row affine in
@@ -275,6 +349,11 @@ impl FrameView {
         let [w0, w1] = row(3);
         [z0, z1, w0, w1]
     }
+}
+
+/// Rays in a row and in a column of a preview.
+pub(crate) fn preview_size(size: [u32; 2], step: u32) -> [u32; 2] {
+    size.map(|s| s.div_ceil(step.max(1)))
 }
 
 fn matrix(what: &'static str, columns: [[f64; 4]; 4]) -> Result<DMat4, Error> {
@@ -361,6 +440,73 @@ mod tests {
         (clip[2][3], clip[3][3]) = (1.0, 240.0);
         let found = FrameView::new(&Camera { clip_from_view: clip, ..camera }, size, world, dims);
         assert!(matches!(found, Err(Error::UnsupportedProjection { .. })), "{found:?}");
+    }
+
+    #[test]
+    fn rays_that_meet_the_volume_are_of_the_pixels_named() {
+        use macrocell::cpu::dda::CellBox;
+        let (size, dims) = ([61, 44], [40, 60, 50]);
+        let world = DMat4::from_scale(DVec3::new(1.0, 0.5, 2.0)).to_cols_array_2d();
+        let grid = Grid::new(dims);
+        let volume = CellBox { low: [0; 3], high: grid.last_cell() };
+        let lru = LruParams { slots: 1, slots_per_page: 1, request_capacity: 1, heads: 1 };
+        let (mut outside, mut whole) = (0, 0);
+        for i in 0..300 {
+            // From inside to far away, looking past the volume at times.
+            let t = f64::from(i);
+            let center = [20.0 + 30.0 * (0.7 * t).sin(), 15.0, 50.0 + 60.0 * (1.3 * t).sin()];
+            let distance = 1.03_f64.powf(t) - 0.9;
+            let camera =
+                Camera::orbit(center, distance, 37.0 * t, 23.0 * (0.3 * t).sin(), 60.0, 1.4);
+            let view = FrameView::new(&camera, size, world, dims).unwrap();
+            for step in [1, 2] {
+                let params = view.preview(step).params(grid, lru, 0.5, LookAhead::NONE);
+                let [low, end] = [params.volume_low, params.volume_end];
+                whole += u32::from([low, end] == [[0; 2], params.size()]);
+                for y in 0..params.size()[1] {
+                    for x in 0..params.size()[0] {
+                        let is_named = x >= low[0] && y >= low[1] && x < end[0] && y < end[1];
+                        let ray = crate::cpu::frame::FrameRay::new(&params, [x, y]).ray;
+                        assert!(is_named || !ray.meets(volume), "camera {i}, ({x}, {y})");
+                        outside += u32::from(!is_named);
+                    }
+                }
+            }
+        }
+        assert!(
+            outside > 100_000 && whole > 50,
+            "{outside} pixels outside, {whole} whole pictures"
+        );
+    }
+
+    #[test]
+    fn a_preview_has_the_same_rays() {
+        let (size, dims) = ([101, 66], [40, 60, 50]);
+        let camera = Camera::orbit([20.0, 30.0, 25.0], 90.0, 25.0, 40.0, 50.0, 1.5);
+        let view = FrameView::new(&camera, size, DMat4::IDENTITY.to_cols_array_2d(), dims).unwrap();
+        let params = |view: &FrameView| {
+            let lru = LruParams { slots: 1, slots_per_page: 1, request_capacity: 1, heads: 1 };
+            view.params(Grid::new(dims), lru, 0.5, LookAhead::NONE)
+        };
+        let full = params(&view);
+        for step in [2, 4] {
+            let preview = view.preview(step);
+            let own = params(&preview);
+            assert_eq!(own.size(), size.map(|s| s.div_ceil(step)));
+            let last = own.size().map(|s| s - 1);
+            for pixel in [[0, 0], [3, 7], last] {
+                let at = pixel.map(|p| p * step);
+                assert_eq!(preview.ray(pixel), view.ray(at));
+                let rays = [(&own, pixel), (&full, at)]
+                    .map(|(f, p)| crate::cpu::frame::FrameRay::new(f, p));
+                assert_eq!(rays[0], rays[1], "{pixel:?}, every {step}th");
+                let (origin, direction, _) = preview.ray(pixel);
+                let p = (DVec3::from(origin) + 40.0 * DVec3::from(direction)).extend(1.0);
+                let rows = preview.pixel_from_index().map(|r| DVec4::from(r.map(f64::from)).dot(p));
+                assert!((rows[0] / rows[2] - f64::from(pixel[0]) - 0.5).abs() < 1e-4, "{pixel:?}");
+                assert!((rows[1] / rows[2] - f64::from(pixel[1]) - 0.5).abs() < 1e-4, "{pixel:?}");
+            }
+        }
     }
 
     #[test]

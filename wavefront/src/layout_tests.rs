@@ -10,7 +10,8 @@ use crate::draw::DrawParams;
 use crate::foveation::SamplingParams;
 use crate::frame::{FrameParams, GridParams};
 use crate::outputs::ShadingParams;
-use crate::{Outputs, Rays, SampleLayout};
+use crate::preview::UpscaleParams;
+use crate::{Outputs, Previews, Rays, SampleLayout};
 
 /// Name, offset and size of every member.
 macro_rules! members {
@@ -50,6 +51,11 @@ fn frame_uniforms_have_the_declared_layout() {
         shift_z,
         shift_misses,
         most_cells,
+        middle,
+        step,
+        preview_level,
+        volume_low,
+        volume_end,
         grid,
         lru,
     });
@@ -110,11 +116,29 @@ fn the_shading_uniform_has_the_declared_layout() {
 fn the_sampling_uniform_has_the_declared_layout() {
     let [mask, ..] = Rays::foveation_sources(SampleLayout::cached(1));
     let source = mask.wgsl.source;
-    let members =
-        members!(SamplingParams { gaze, share_per_pixel, falloff, base_density, slice, draws });
+    let members = members!(SamplingParams {
+        gaze,
+        share_per_pixel,
+        falloff,
+        base_density,
+        slice,
+        draws,
+        lattice_level,
+        pad0,
+    });
     check_struct(&source, "SamplingParams", &members).unwrap();
     let bytes = size_of::<SamplingParams>() as u32;
     assert_eq!(struct_size(&source, "SamplingParams"), Ok(bytes));
+}
+
+#[test]
+fn the_upscale_uniform_has_the_declared_layout() {
+    let [upscale, _] = Previews::sources(Outputs::default(), SampleLayout::cached(1));
+    let source = upscale.wgsl.source;
+    let members = members!(UpscaleParams { size, step, crisp });
+    check_struct(&source, "UpscaleParams", &members).unwrap();
+    let bytes = size_of::<UpscaleParams>() as u32;
+    assert_eq!(struct_size(&source, "UpscaleParams"), Ok(bytes));
 }
 
 #[test]

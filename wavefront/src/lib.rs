@@ -13,6 +13,7 @@ mod layout_tests;
 mod order;
 mod outputs;
 mod plan;
+mod preview;
 mod rays;
 mod run_ahead;
 mod samples;
@@ -32,6 +33,7 @@ pub use outputs::{
     DEPTH_NONE, Light, OutputTextures, Outputs, PixelStatus, Shading, ShadingParams,
 };
 pub use plan::WavefrontPlan;
+pub use preview::{PreviewBinds, Previews};
 pub use rays::{Counters, RayBuffers, Rays};
 pub use run_ahead::RunAhead;
 pub use samples::{SampleLayout, Samples};

@@ -25,6 +25,19 @@ impl RayOrder {
         Self { level, columns: size[0].div_ceil(edge), rows: size[1].div_ceil(edge) }
     }
 
+    /// The order of a frame's uniform.
+    pub(crate) fn of(level: u32, columns: u32, numbers: u32) -> Self {
+        Self { level, columns, rows: (numbers >> (2 * (TILE.ilog2() + level))) / columns.max(1) }
+    }
+
+    /// The order of every `step`-th pixel's ray in both directions, in which ray n is this order's ray `n * step^2`.
+    /// `None` unless `step` is a power of two and the squares have as many tiles on an edge.
+    #[must_use]
+    pub fn preview(&self, step: u32) -> Option<Self> {
+        let level = self.level.checked_sub(step.checked_ilog2()?)?;
+        step.is_power_of_two().then_some(Self { level, ..*self })
+    }
+
     /// Numbers in all, a multiple of 64.
     pub fn numbers(&self) -> u64 {
         (u64::from(self.columns) * u64::from(self.rows)) << self.bits()
@@ -92,6 +105,30 @@ mod tests {
                 }
             }
             assert!(seen.iter().all(|&n| n == 1), "{size:?}");
+        }
+    }
+
+    #[test]
+    fn a_preview_has_every_pixel_of_a_lattice_in_the_same_order() {
+        for size in [[200, 133], [64, 64], [129, 75], [18, 40]] {
+            let order = RayOrder::new(size);
+            for step in [1, 2, 4] {
+                let Some(preview) = order.preview(step) else {
+                    assert!(order.level() < step.ilog2(), "{size:?}, {step}");
+                    continue;
+                };
+                let inside = |p: [u32; 2]| p[0] * step < size[0] && p[1] * step < size[1];
+                let mut seen = 0;
+                for number in 0..preview.numbers() as u32 {
+                    let pixel = preview.pixel(number);
+                    assert_eq!(order.number(pixel.map(|p| p * step)), number * step * step);
+                    assert_eq!(preview.number(pixel), number);
+                    seen += u32::from(inside(pixel));
+                }
+                assert_eq!(seen, size[0].div_ceil(step) * size[1].div_ceil(step), "{size:?}");
+            }
+            assert!(order.preview(3).is_none() && order.preview(0).is_none());
+            assert!(order.preview(8).is_none());
         }
     }
 

@@ -45,27 +45,33 @@ struct PictureFormat {
     label: &'static str,
     /// Constant in the shaders that holds its binding number.
     binding: &'static str,
+    /// That of a preview's picture that is read.
+    read_binding: &'static str,
     format: wgpu::TextureFormat,
 }
 
 const COLOR: PictureFormat = PictureFormat {
     label: "wavefront.output.color",
     binding: "COLOR_BINDING",
+    read_binding: "PREVIEW_COLOR_BINDING",
     format: wgpu::TextureFormat::Rgba8Unorm,
 };
 const DEPTH: PictureFormat = PictureFormat {
     label: "wavefront.output.depth",
     binding: "DEPTH_BINDING",
+    read_binding: "PREVIEW_DEPTH_BINDING",
     format: wgpu::TextureFormat::R32Float,
 };
 const NORMAL: PictureFormat = PictureFormat {
     label: "wavefront.output.normal",
     binding: "NORMAL_BINDING",
+    read_binding: "PREVIEW_NORMAL_BINDING",
     format: wgpu::TextureFormat::Rgba16Float,
 };
 const STATUS: PictureFormat = PictureFormat {
     label: "wavefront.output.status",
     binding: "STATUS_BINDING",
+    read_binding: "PREVIEW_STATUS_BINDING",
     format: wgpu::TextureFormat::R32Uint,
 };
 
@@ -111,6 +117,21 @@ impl Outputs {
     /// Bytes per pixel of all pictures.
     pub(crate) fn bytes_per_pixel(self) -> u64 {
         self.formats().map(|p| u64::from(p.format.block_copy_size(None).unwrap_or(0))).sum()
+    }
+
+    /// Bindings of the textures where they are read, to follow a kernel's buffers.
+    pub(crate) fn read_bindings(self) -> Vec<Binding> {
+        let sample = |picture| match picture {
+            STATUS => wgpu::TextureSampleType::Uint,
+            _ => wgpu::TextureSampleType::Float { filterable: false },
+        };
+        self.formats().map(|p| Binding::TextureSample { sample: sample(p) }).collect()
+    }
+
+    /// Their binding numbers from `first` on, under names for `shader/upscale.wgsl`.
+    pub(crate) fn read_constants(self, first: u32) -> Vec<(&'static str, Constant)> {
+        let names = self.formats().map(|picture| picture.read_binding);
+        names.zip(first..).map(|(name, number)| (name, Constant::U32(number))).collect()
     }
 
     /// Bindings of the textures, to follow a kernel's buffers.
@@ -333,10 +354,14 @@ impl ShadingParams {
                 (unit.as_vec3().to_array(), 0)
             }
         };
+        // As the picture holds them, so that it does not matter who writes them.
+        let [background, unfinished] = [shading.background, shading.unfinished]
+            .map(|color| color.map(|c| (c.clamp(0.0, 1.0) * 255.0).round() / 255.0));
         Self {
-            // As the picture holds it, so that it does not matter who writes it.
-            background: shading.background.map(|c| (c.clamp(0.0, 1.0) * 255.0).round() / 255.0),
-            unfinished: shading.unfinished,
+            background,
+            unfinished,
+            // Nothing is to be written over a colour that is right already.
+            start_columns: if background == unfinished { 0 } else { u32::MAX },
             base_color: shading.base_color,
             ambient: shading.ambient,
             light,
@@ -344,7 +369,6 @@ impl ShadingParams {
             diffuse: shading.diffuse,
             specular: shading.specular,
             shininess: shading.shininess,
-            start_columns: u32::MAX,
             normal_x,
             pad1: 0,
             normal_y,
@@ -365,6 +389,11 @@ impl ShadingParams {
     #[must_use]
     pub fn filled(self) -> Self {
         Self { start_columns: 0, ..self }
+    }
+
+    /// For frames that start in pictures of any colour.
+    pub(crate) fn drawn_over(self) -> Self {
+        Self { start_columns: u32::MAX, ..self }
     }
 
     /// The colour of the picture when a frame starts.

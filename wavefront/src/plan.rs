@@ -3,7 +3,7 @@
 use gpu_primitives::wgpu;
 
 use crate::foveation::{BlueNoise, SamplingParams};
-use crate::frame::{FrameParams, PARAMS_BYTES};
+use crate::frame::{FrameParams, PARAMS_BYTES, preview_size};
 use crate::order::RayOrder;
 use crate::outputs::ShadingParams;
 use crate::{Error, Outputs};
@@ -34,7 +34,9 @@ pub(crate) fn list_capacity(size: [u32; 2]) -> u64 {
 /// Sizes of everything this crate allocates for pictures of one size.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct WavefrontPlan {
+    /// Rays in a row and in a column, and their order.
     size: [u32; 2],
+    order: RayOrder,
     outputs: Outputs,
     foveation: Option<&'static BlueNoise>,
 }
@@ -48,7 +50,7 @@ impl WavefrontPlan {
         let [width, height] = size;
         let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let most_edge = limits.max_texture_dimension_2d;
-        let plan = Self { size, outputs, foveation: None };
+        let plan = Self { size, order: RayOrder::new(size), outputs, foveation: None };
         let fits = width > 0 && height > 0 && width <= most_edge && height <= most_edge;
         if !fits || plan.state_bytes() > binding {
             // About: what lies outside the picture in its last squares counts, too.
@@ -62,6 +64,14 @@ impl WavefrontPlan {
     #[must_use]
     pub fn with_foveation(self, tiles: Option<&'static BlueNoise>) -> Self {
         Self { foveation: tiles, ..self }
+    }
+
+    /// The same for previews: pictures of every `step`-th pixel in both directions. `None` unless `step` is a power of two
+    /// above 1 and the picture is large enough for it.
+    #[must_use]
+    pub fn preview(&self, step: u32) -> Option<Self> {
+        let order = self.order.preview(step).filter(|_| step > 1)?;
+        Some(Self { size: preview_size(self.size, step), order, ..self.clone() })
     }
 
     /// Tiles of the sampling masks.
@@ -85,8 +95,8 @@ impl WavefrontPlan {
     }
 
     /// Numbers of rays in their order; a few more than pixels.
-    pub(crate) fn numbers(&self) -> u64 {
-        RayOrder::new(self.size).numbers()
+    pub fn numbers(&self) -> u64 {
+        self.order.numbers()
     }
 
     /// Header, states, active bits and active list.

@@ -88,6 +88,10 @@ impl Counters {
     /// Where the counters are in [`RayBuffers::rays`]: byte offset and length.
     pub const BYTES: (u64, u64) = (0, size_of::<Counters>() as u64);
 
+    /// What a frame's counters go on from when it goes on from a preview: hits; lists and what follows them up to `cut`,
+    /// of which `cells` is 0 then. Byte offsets and lengths.
+    pub(crate) const CARRIED: [(u64, u64); 2] = [(8, 4), (16, 16)];
+
     /// The longest part of an active ray, in voxels, in which its first hit may still lie: from where
     /// it waits to where it leaves the volume. 0 when no ray is active.
     pub fn open_depth_voxels(&self) -> f32 {
@@ -174,12 +178,21 @@ impl Rays {
         let mut resolve = vec![FRAME_PARAMS, shading, RAYS];
         resolve.extend(samples.bindings());
         let [list_sum, list_fill] = Self::list_sources(samples, false);
+        let resume = [("RESUME", Constant::Bool(false))];
         [
-            source("wavefront.start", START, start, samples, &[], Some(outputs)),
+            source("wavefront.start", START, start, samples, &resume, Some(outputs)),
             source("wavefront.resolve", RESOLVE, resolve, samples, &[], Some(outputs)),
             list_sum,
             list_fill,
         ]
+    }
+
+    /// The start of a frame that goes on from a preview, whose rays are bound behind what the usual one binds.
+    pub(crate) fn resume_source(outputs: Outputs, samples: SampleLayout) -> KernelSource {
+        let shading = Binding::Uniform { bytes: size_of::<ShadingParams>() as u64 };
+        let bindings = vec![FRAME_PARAMS, shading, RAYS, MASKS, READ];
+        let constants = [("RESUME", Constant::Bool(true))];
+        source("wavefront.resume", START, bindings, samples, &constants, Some(outputs))
     }
 
     /// Texts and bindings of the kernels that make a sampling mask and list only the rays that it has.
@@ -210,18 +223,26 @@ impl Rays {
         (frame, shading): (&FrameParams, &ShadingParams),
         sampling: Option<&SamplingParams>,
     ) {
-        buffers.record_params(device, encoder, upload, frame);
-        upload.write(device, encoder, &buffers.shading, 0, bytemuck::bytes_of(shading));
-        // No ray has started.
-        let words = RAYS_HEADER_WORDS + buffers.plan.numbers();
-        encoder.clear_buffer(&buffers.rays, 0, Some(4 * words));
         // A render pass's clearing costs a fraction of as many writes.
         textures.record_unfinished(encoder, shading.start_color());
+        buffers.record_params(device, encoder, upload, frame);
+        buffers.record_start(device, encoder, upload, shading);
         {
             let mut pass = begin(encoder, "wavefront.start");
-            let groups = buffers.plan.numbers().div_ceil(u64::from(RAYS_PER_WORD_GROUP));
-            self.start.dispatch(&mut pass, &buffers.start, groups);
+            self.start.dispatch(&mut pass, &buffers.start, buffers.word_groups());
         }
+        self.record_first_list(device, encoder, upload, buffers, sampling);
+    }
+
+    /// Records the first list of a frame's rays.
+    pub(crate) fn record_first_list(
+        &self,
+        device: &wgpu::Device,
+        encoder: &mut wgpu::CommandEncoder,
+        upload: &mut UploadRing,
+        buffers: &RayBuffers,
+        sampling: Option<&SamplingParams>,
+    ) {
         if let (Some(sampling), Some(foveation)) = (sampling, &buffers.foveation) {
             encoder.clear_buffer(&foveation.mask, 0, None);
             self.record_mask(device, encoder, upload, buffers, sampling);
@@ -243,8 +264,7 @@ impl Rays {
         if let (Some(kernel), Some(foveation)) = (&self.sampling_mask, &buffers.foveation) {
             upload.write(device, encoder, &foveation.params, 0, bytemuck::bytes_of(sampling));
             let mut pass = begin(encoder, "wavefront.sampling_mask");
-            let groups = buffers.plan.numbers().div_ceil(u64::from(RAYS_PER_WORD_GROUP));
-            kernel.dispatch(&mut pass, &foveation.bind, groups);
+            kernel.dispatch(&mut pass, &foveation.bind, buffers.word_groups());
             self.record_list(&mut pass, buffers);
         }
     }
@@ -370,6 +390,24 @@ impl RayBuffers {
         params: &FrameParams,
     ) {
         upload.write(device, encoder, &self.frame, 0, bytemuck::bytes_of(params));
+    }
+
+    /// Records that no ray has started, and how hits look.
+    pub(crate) fn record_start(
+        &self,
+        device: &wgpu::Device,
+        encoder: &mut wgpu::CommandEncoder,
+        upload: &mut UploadRing,
+        shading: &ShadingParams,
+    ) {
+        upload.write(device, encoder, &self.shading, 0, bytemuck::bytes_of(shading));
+        let words = RAYS_HEADER_WORDS + self.plan.numbers();
+        encoder.clear_buffer(&self.rays, 0, Some(4 * words));
+    }
+
+    /// Workgroups of a kernel over words of rays.
+    pub(crate) fn word_groups(&self) -> u64 {
+        self.plan.numbers().div_ceil(u64::from(RAYS_PER_WORD_GROUP))
     }
 
     /// Where the arguments of the list's first kernel are in [`Self::args`].

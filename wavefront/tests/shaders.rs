@@ -4,7 +4,7 @@
 
 use gpu_primitives::kernel::KernelSource;
 use gpu_testkit::layout::{check_kernel, validate_wgsl};
-use wavefront::{Outputs, Rays, RunAhead, SampleLayout};
+use wavefront::{Outputs, Previews, Rays, RunAhead, SampleLayout};
 
 fn check(source: &KernelSource) {
     check_kernel(source).unwrap();
@@ -19,6 +19,7 @@ fn kernels_validate_with_every_set_of_outputs_and_pages() {
             for samples in [SampleLayout::cached(pages), SampleLayout::resident(pages)] {
                 Rays::sources(outputs, samples).iter().for_each(check);
                 Rays::foveation_sources(samples).iter().for_each(check);
+                Previews::sources(outputs, samples).iter().for_each(check);
                 RunAhead::sources(samples).iter().for_each(check);
             }
         }

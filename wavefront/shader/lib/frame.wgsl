@@ -26,6 +26,11 @@ struct FrameParams {
     shift_z: u32,
     shift_misses: u32,
     most_cells: u32, // RunAhead: cells that one walk of all listed rays visits
+    middle: vec2<f32>,  // of the whole picture, in its pixels
+    step: f32,          // of its pixels from one ray to the next
+    preview_level: u32, // log2 of the step of a preview that the frame goes on from, 0 for none
+    volume_low: vec2<u32>, // pixels outside of which no ray meets the volume: the first ones
+    volume_end: vec2<u32>, // and those after the last ones
     grid: MacrocellGrid,
     lru: LruParams,
 }
@@ -38,6 +43,7 @@ struct FrameRay {
 // What a pixel's ray is made of, for loops over pixels: lavapipe loads a uniform as if every lane had its own.
 struct FrameRays {
     middle: vec2<f32>,
+    step: f32,
     origin: vec3<f32>,
     origin_dx: vec3<f32>,
     origin_dy: vec3<f32>,
@@ -48,12 +54,12 @@ struct FrameRays {
 
 fn frame_rays(frame: FrameParams) -> FrameRays {
     return FrameRays(
-        0.5 * vec2<f32>(f32(frame.width), f32(frame.height)), frame.origin, frame.origin_dx, frame.origin_dy,
+        frame.middle, frame.step, frame.origin, frame.origin_dx, frame.origin_dy,
         frame.direction, frame.direction_dx, frame.direction_dy);
 }
 
 fn frame_ray_of(rays: FrameRays, pixel: vec2<u32>) -> FrameRay {
-    let offset = vec2<f32>(pixel) + vec2<f32>(0.5) - rays.middle;
+    let offset = rays.step * vec2<f32>(pixel) + vec2<f32>(0.5) - rays.middle;
     let origin = rays.origin + offset.x * rays.origin_dx + offset.y * rays.origin_dy;
     let direction = rays.direction + offset.x * rays.direction_dx + offset.y * rays.direction_dy;
     let depth_per_voxel = 1.0 / length(direction);
@@ -131,6 +137,16 @@ fn frame_active_word(frame: FrameParams, ray: u32) -> u32 {
 
 fn frame_list_word(frame: FrameParams, index: u32) -> u32 {
     return RAYS_HEADER + frame.ray_numbers + frame.ray_numbers / 32u + index;
+}
+
+// Whether any of the pixels from `corner` on, `size` of them, may have a ray that meets the volume.
+fn frame_may_meet(frame: FrameParams, corner: vec2<u32>, size: vec2<u32>) -> bool {
+    return all(corner < frame.volume_end) && all(corner + size > frame.volume_low);
+}
+
+// Of a word's rays, those that a preview has.
+fn frame_preview_bits(preview_level: u32) -> u32 {
+    return select(select(0u, 0x11111111u, preview_level == 1u), 0x00010001u, preview_level == 2u);
 }
 
 // Bits 0, 2, 4, .. of both components, put together.

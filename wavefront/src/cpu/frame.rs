@@ -17,8 +17,7 @@ pub struct FrameRay {
 impl FrameRay {
     /// The ray through the centre of `pixel`.
     pub fn new(frame: &FrameParams, pixel: [u32; 2]) -> Self {
-        let size = [frame.width, frame.height];
-        let offset = [0, 1].map(|a| pixel[a] as f32 + 0.5 - 0.5 * size[a] as f32);
+        let offset = [0, 1].map(|a| frame.step * pixel[a] as f32 + 0.5 - frame.middle[a]);
         let affine = |v: [f32; 3], dx: [f32; 3], dy: [f32; 3]| -> [f32; 3] {
             std::array::from_fn(|i| v[i] + offset[0] * dx[i] + offset[1] * dy[i])
         };
@@ -53,7 +52,11 @@ pub struct RayStates<'a> {
 impl<'a> RayStates<'a> {
     /// The words of the buffer of a frame's rays.
     pub fn new(frame: &'a FrameParams, words: &'a [u32]) -> Self {
-        Self { frame, order: RayOrder::new([frame.width, frame.height]), words }
+        Self {
+            frame,
+            order: RayOrder::of(frame.ray_level, frame.ray_columns, frame.ray_numbers),
+            words,
+        }
     }
 
     /// Whether a pixel's ray is not finished.

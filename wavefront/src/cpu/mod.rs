@@ -5,4 +5,5 @@ pub mod cell;
 pub mod frame;
 pub mod sampling_mask;
 pub mod shading;
+pub mod upscale;
 pub mod walk;

@@ -7,7 +7,8 @@ use crate::foveation::{BlueNoise, SamplingParams};
 /// A GPU's `exp` and `pow` may differ, so the kernel may decide otherwise where the margin is small.
 #[must_use]
 pub fn margin(tiles: &BlueNoise, params: &SamplingParams, pixel: [u32; 2]) -> f32 {
-    if params.draws == 0 {
+    let on_lattice = pixel.iter().all(|p| p % (1 << params.lattice_level) == 0);
+    if params.draws == 0 || (params.lattice_level > 0 && on_lattice) {
         return f32::INFINITY;
     }
     let mut left = not_drawn(params, pixel);
