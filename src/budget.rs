@@ -92,14 +92,23 @@ pub(crate) struct Choice {
     /// 0 without a pre-pass.
     work: f64,
     pub(crate) setting: Setting,
-    /// The share that was asked for: about that of the setting.
+    /// The share that was asked for: about that of the setting; and whether to find out what it takes.
     asked: f64,
+    is_trial: bool,
     /// How far it looks ahead.
     pub(crate) look_ahead: u32,
     pub(crate) predicted_ms: Option<f64>,
     pub(crate) target_ms: f64,
     /// CPU time of pre-pass and prediction and of learning from the frame before.
     pub(crate) cpu_ms: f64,
+}
+
+/// A share that is asked for: whether it is predicted to fit, and whether to find out what it takes.
+#[derive(Clone, Copy, Debug)]
+struct Fitting {
+    asked: f64,
+    fits: bool,
+    is_trial: bool,
 }
 
 /// A frame whose time is known: the share that was asked for, what it took, and its work.
@@ -125,8 +134,7 @@ pub(crate) struct Budget {
     /// The newest frame that was measured, and the share that was asked for last.
     last: Option<Measured>,
     asked: f64,
-    /// Whether that is a trial, frames until the next one, and how many there were between the newest ones.
-    is_trial: bool,
+    /// Frames until the next trial, and how many there were between the newest ones.
     trial_in: u32,
     trial_wait: u32,
     /// First and last steps that a frame with a usable time had.
@@ -150,7 +158,6 @@ impl Budget {
             level: None,
             last: None,
             asked: FIRST_SHARE,
-            is_trial: false,
             trial_in: 0,
             trial_wait: 0,
             steps_seen: Vec::new(),
@@ -215,20 +222,21 @@ impl Budget {
         };
         let mut look_ahead = request.look_ahead;
         let mut outlook = outlook_of(look_ahead);
+        let mut is_trial = false;
         let asked = match (self.mode, &outlook) {
             _ if self.unusable >= MOST_UNUSABLE => 1.0,
             (BudgetMode::Fixed, _) => 1.0,
             (BudgetMode::TwoPass, _) => (self.after_last(target_ms) / 4.0).max(LEAST_SHARE),
             (BudgetMode::Predicted, Some(known)) if self.level.is_some() => {
-                let (asked, fits) = self.fitting(known, request);
-                if cached && look_ahead > 1 && !fits {
+                let mut found = self.fitting(known, request);
+                if cached && look_ahead > 1 && !found.fits {
                     // What too few rays do not make room for may be what is decoded for later.
                     look_ahead = 1;
                     outlook = outlook_of(look_ahead);
-                    outlook.map_or(asked, |outlook| self.fitting(&outlook, request).0)
-                } else {
-                    asked
+                    found = outlook.map_or(found, |outlook| self.fitting(&outlook, request));
                 }
+                is_trial = found.is_trial;
+                found.asked
             }
             _ => self.after_last(target_ms),
         };
@@ -245,6 +253,7 @@ impl Budget {
             work: units,
             setting,
             asked,
+            is_trial,
             look_ahead,
             predicted_ms,
             target_ms,
@@ -285,13 +294,12 @@ impl Budget {
             self.steps_seen.push([first, last]);
             if first > 1 {
                 // Drivers finish compiling kernels when they first run.
-                self.is_trial = false;
                 return;
             }
         }
         let begin = Instant::now();
         self.last = Some(Measured { asked: choice.asked, ms, work: choice.work });
-        self.end_trial(ms > choice.target_ms);
+        self.end_frame(choice.is_trial, ms > choice.target_ms);
         if let Some(predicted_ms) = choice.predicted_ms {
             let error = (ms / predicted_ms).ln().abs().min(MOST_ERROR);
             self.spread += SPREAD_RATE * (error - self.spread);
@@ -305,10 +313,10 @@ impl Budget {
         self.learning_ms = begin.elapsed().as_secs_f64() * 1e3;
     }
 
-    /// Takes in whether the newest frame took too long. A trial that did makes the next one wait twice as long.
-    fn end_trial(&mut self, is_too_long: bool) {
+    /// Takes in whether a frame took too long. A trial that did makes the next one wait twice as long.
+    fn end_frame(&mut self, is_trial: bool, is_too_long: bool) {
         self.trial_in = self.trial_in.saturating_sub(1);
-        if std::mem::take(&mut self.is_trial) {
+        if is_trial {
             let longer = (2 * self.trial_wait).clamp(LEAST_WAIT, MOST_WAIT);
             self.trial_wait = if is_too_long { longer } else { 0 };
             self.trial_in = self.trial_wait;
@@ -324,7 +332,7 @@ impl Budget {
     /// The largest share that is predicted to fit, and whether there is one. Where none does, the one that is predicted to
     /// take clearly less than the frame before's, or half of that one: what is not known may be better. Fewer rays leave
     /// more pixels to fill, so time need not fall with them; from the least share on, the way is up again.
-    fn fitting(&mut self, outlook: &Outlook, request: &Request<'_>) -> (f64, bool) {
+    fn fitting(&self, outlook: &Outlook, request: &Request<'_>) -> Fitting {
         let target_ms = request.target_ms;
         let most = (self.asked / MOST_STEP).clamp(LEAST_SHARE, 1.0);
         let settings = (0..=CANDIDATES).map(|i| {
@@ -346,19 +354,16 @@ impl Budget {
         if let Some(more) = self.trial(outlook, target_ms, settings)
             && fits.is_none_or(|fits| fits < more)
         {
-            self.is_trial = true;
-            return (more, true);
+            return Fitting { asked: more, fits: true, is_trial: true };
         }
         if let Some(fits) = fits {
-            return (fits, true);
+            return Fitting { asked: fits, fits: true, is_trial: false };
         }
         let before_ms = self.cautious_ms(outlook, &Setting::new(self.asked, request.steps));
         let at_least = self.asked <= LEAST_SHARE;
-        if at_least || least_ms < CLEARLY_LESS * before_ms {
-            (best, false)
-        } else {
-            ((0.5 * self.asked).max(LEAST_SHARE), false)
-        }
+        let is_best = at_least || least_ms < CLEARLY_LESS * before_ms;
+        let asked = if is_best { best } else { (0.5 * self.asked).max(LEAST_SHARE) };
+        Fitting { asked, fits: false, is_trial: false }
     }
 
     /// The largest share that fits if it costs as much per unit of work as the frame before, where that one left much room

@@ -138,6 +138,7 @@ impl Preview {
             let (rays, binds) = ((&self.casting.rays, &casting.rays), self.binds(step));
             let start = &stages.rays;
             stage.record_resume(device, encoder, upload, start, binds, rays, view, sampling);
+            casting.rounds.record_start(encoder, start, &casting.rays);
         }
     }
 }

@@ -57,6 +57,10 @@ pub struct InfillOptions {
     pub guided: bool,
     /// Whether a scene that has next to nothing to fill has it, too.
     pub when: InfillWhen,
+    /// Whether it works at half the picture's resolution, with a third of the memory and in a fraction of the time where most
+    /// pixels are to be filled: of 2x2 pixels one that is finished counts for all, and unfinished ones show colours between
+    /// those of such pixels. For large pictures, and where few rays are cast at first. Tiny pictures are filled at theirs.
+    pub half_resolution: bool,
 }
 
 /// What shows where a pixel is unfinished.
@@ -243,8 +247,10 @@ pub struct FrameOptions {
     /// ```
     pub foveation: Option<Foveation>,
     /// Milliseconds that the frame's first pass should take. Its time is predicted, and it casts as large a share of the
-    /// rays, spread evenly over the picture, as fits; the passes after it cast the others. Rays that were not
-    /// cast are unfinished, as with `foveation`, so they are filled as `infill` says. A caller's own `foveation` is left
+    /// rays, spread evenly over the picture, as fits; the passes after it cast the others. Where that are few and pixels
+    /// are filled after every pass, it is a preview, see [`crate::PassReport::step`]: in-fill works at that resolution, and
+    /// pixels between the preview's show colours between its until they are finished. Rays that were not
+    /// cast are unfinished, as with `foveation`, so else they are filled as `infill` says. A caller's own `foveation` is left
     /// alone: such frames are not adapted. Needs [`RendererOptions::budget`].
     pub target_ms: Option<f32>,
     /// Completeness that is enough: from then on reports are [`crate::PassReport::stopped`] and pixels are filled,

@@ -282,10 +282,18 @@ impl<'a> Scene<'a> {
             let network = infill.network.is_some();
             InfillPlan::new(size, infill.sources, network, &macrocell, limits)
         };
-        let infill = infill_options.map(|infill| infill_plan(infill, options.size)).transpose()?;
+        let infill = infill_options
+            .map(|asked| {
+                let plan = infill_plan(asked, options.size)?;
+                let half = plan.halved().filter(|_| asked.half_resolution);
+                Ok::<_, Error>(half.unwrap_or(plan))
+            })
+            .transpose()?;
         let mut previews = Vec::new();
         let has_previews = options.budget.is_some_and(BudgetMode::has_previews)
-            && matches!(strategy, StrategyPlan::RunAhead);
+            && matches!(strategy, StrategyPlan::RunAhead)
+            // Which draws no pixel without a depth.
+            && options.draw_target.is_none();
         if let (Some(asked), true) = (infill_options, has_previews) {
             for step in PREVIEW_STEPS {
                 let Some(wavefront) = wavefront.preview(step) else { continue };
@@ -474,7 +482,7 @@ impl<'a> Scene<'a> {
                 None => Part::left_out("frame budget", "not asked for"),
             },
             if self.previews.is_empty() {
-                Part::left_out("previews", "no frame budget with in-fill that needs them")
+                Part::left_out("previews", "no frames held to a time that may begin with them")
             } else {
                 // Bound for the picture and for the next finer preview, if there is one.
                 let binds = 2 * self.previews.len() as u64 - 1;

@@ -6,7 +6,7 @@ use gpu_primitives::readback::{Lost, ReadbackRing};
 use wavefront::Statistics;
 use web_time::Instant;
 
-use crate::budget::{Budget, Choice};
+use crate::budget::{Budget, Choice, Setting};
 use crate::schedule::Schedule;
 use crate::timing::Timer;
 use crate::{BudgetMode, PassReport, Residency, ScenePlan, wgpu};
@@ -64,6 +64,8 @@ pub(crate) struct PassInfo {
     pub(crate) step: u32,
     /// Whether unfinished pixels show what a preview had.
     pub(crate) is_resumed: bool,
+    /// Whether in-fill works at a lower resolution, so that it does not count pixels.
+    pub(crate) is_reduced: bool,
     /// Whether only the rays of a sampling mask are cast.
     pub(crate) foveated: bool,
     /// What its setting was chosen by.
@@ -82,6 +84,14 @@ pub(crate) struct PassInfo {
     pub(crate) cpu_ms: f64,
 }
 
+impl PassInfo {
+    /// Whether the frame is as complete as it has to be to be filled, as `gate.wgsl` of in-fill decides it.
+    fn is_enough(&self, rays: &wavefront::Counters) -> bool {
+        let finished = (rays.entered - rays.active.min(rays.entered)) as f32;
+        finished >= self.stop_at.unwrap_or(0.0) * rays.entered as f32
+    }
+}
+
 /// What a pass's rays have done, as a report tells it.
 #[derive(Debug, Clone, Copy)]
 struct RayCounts {
@@ -98,7 +108,8 @@ impl RayCounts {
     fn new(info: &PassInfo, rays: &wavefront::Counters, filled: u32) -> Self {
         let sampled = if info.foveated { rays.sampled } else { info.rays };
         let exact = info.rays - rays.active.min(info.rays);
-        let filled = if info.is_resumed { rays.active } else { filled };
+        let shows_all = info.is_resumed || (info.is_reduced && info.is_enough(rays));
+        let filled = if shows_all { rays.active } else { filled };
         if info.step <= 1 {
             return Self {
                 sampled,
@@ -308,7 +319,8 @@ impl PassRecords {
         let rounds_before = if same_frame { self.report.rounds } else { 0 };
         let cut_before = if same_frame { self.report.cut_walks } else { 0 };
         let rounds = rounds.saturating_sub(rounds_before);
-        self.schedule.take(info.pass == 1, rounds, ms * f64::from(info.step * info.step));
+        let setting = info.choice.filter(|_| info.pass == 1).map_or(Setting::ALL, |c| c.setting);
+        self.schedule.take(setting, info.pass == 1, rounds, ms);
         let in_force = info.most_cells == self.schedule.most_cells();
         if rounds > 0 && cut != cut_before && in_force {
             self.schedule.calibrate(ms / f64::from(rounds), info.pass_ms);
@@ -344,10 +356,7 @@ impl PassRecords {
         report.hits = record.rays.hits;
         report.open_depth_voxels = counts.open_depth_voxels;
         report.filled_pixels = counts.filled;
-        // As `gate.wgsl` of in-fill decides it.
-        let finished = (counts.entered - counts.active.min(counts.entered)) as f32;
-        let enough = |share: f32| finished >= share * counts.entered as f32;
-        report.stopped = info.stop_at.is_some_and(enough);
+        report.stopped = info.stop_at.is_some() && info.is_enough(&record.rays);
         report.blocks_used = since(record.cache.used, record.cache_before.used);
         report.blocks_requested = since(record.cache.requested, record.cache_before.requested);
         report.blocks_decoded = since(record.cache.decoded, record.cache_before.decoded);

@@ -12,7 +12,7 @@ use gpu_primitives::upload::UploadRing;
 use wavefront::{FrameView, OutputTextures};
 use web_time::Instant;
 
-use frame_state::FrameState;
+use frame_state::{FrameState, ShownHits};
 
 use crate::capture::PendingCapture;
 use crate::faults::{Faults, Scopes, Task, is_lost};
@@ -57,8 +57,7 @@ pub struct ProgressiveIsoRenderer {
     frame: Option<FrameState>,
     frame_count: u64,
     active_isovalue: Option<f32>,
-    /// Steps and the isovalues of the hits that their rays have found last.
-    shown: Vec<(u32, f32)>,
+    shown: ShownHits,
     clear_cache: bool,
 }
 
@@ -122,7 +121,7 @@ impl ProgressiveIsoRenderer {
             frame: None,
             frame_count: 0,
             active_isovalue: None,
-            shown: Vec::new(),
+            shown: ShownHits::default(),
             clear_cache: false,
         })
     }
@@ -371,6 +370,7 @@ impl ProgressiveIsoRenderer {
         let foveated = state.is_some_and(|state| state.sampling.is_some());
         let choice = state.and_then(|state| state.choice);
         let look_ahead = state.map_or(0, |state| state.look_ahead().blocks);
+        let is_reduced = fills && self.plan.infill.as_ref().is_some_and(|infill| infill.step() > 1);
         let [width, height] = self.options.size;
         let cpu_ms = begin.elapsed().as_secs_f64() * 1e3;
         let pixels = width * height;
@@ -385,6 +385,7 @@ impl ProgressiveIsoRenderer {
             rays,
             step,
             is_resumed: state.is_some_and(FrameState::is_resumed),
+            is_reduced,
             foveated,
             choice,
             look_ahead,

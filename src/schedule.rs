@@ -2,15 +2,24 @@
 
 use wavefront::FrameParams;
 
+use crate::budget::Setting;
+
 /// Rounds of a pass by measured time.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Schedule {
+    /// By the logarithms of a setting's first and last step.
+    rounds: [[Rounds; 3]; 3],
+    /// Cells that a walk may visit; `None` before anything was measured.
+    most_cells: Option<u32>,
+}
+
+/// Rounds of passes of one kind.
+#[derive(Debug, Clone, Copy, Default)]
+struct Rounds {
     /// Milliseconds that a round took lately; `None` before anything was measured.
     round_ms: Option<f64>,
     /// Rounds in which the first pass of the newest frame had something to do; `None` before there was one.
     first_rounds: Option<u32>,
-    /// Cells that a walk may visit; `None` before anything was measured.
-    most_cells: Option<u32>,
 }
 
 /// Cells of a walk before anything was measured: 64 for each of the 2 million rays that are walked at most, more
@@ -31,14 +40,16 @@ const MEMORY: f64 = 0.7;
 impl Schedule {
     /// Rounds of the next pass: at least 1, at most `most`, and no more than fit `pass_ms`. The `first` of a frame
     /// has but one more than the frame before had to do, since every round costs dispatches, empty ones, too.
-    pub(crate) fn rounds(&self, first: bool, most: u32, pass_ms: f32) -> u32 {
+    pub(crate) fn rounds(&self, setting: Setting, first: bool, most: u32, pass_ms: f32) -> u32 {
         let most = most.max(1);
         if pass_ms == f32::INFINITY {
             return most;
         }
         // A pass of one round comes first, so that something is measured.
-        let fitting = self.round_ms.map_or(1.0, |ms| f64::from(pass_ms) / ms.max(1e-3)) as u32;
-        let needed = self.first_rounds.filter(|_| first).map_or(u32::MAX, |n| n.saturating_add(1));
+        let [i, j] = places(setting);
+        let Rounds { round_ms, first_rounds } = self.rounds[i][j];
+        let fitting = round_ms.map_or(1.0, |ms| f64::from(pass_ms) / ms.max(1e-3)) as u32;
+        let needed = first_rounds.filter(|_| first).map_or(u32::MAX, |n| n.saturating_add(1));
         fitting.min(needed).clamp(1, most)
     }
 
@@ -58,21 +69,29 @@ impl Schedule {
     }
 
     /// Takes in what a pass took that had something to do in `rounds` rounds; `first`: of a frame.
-    pub(crate) fn take(&mut self, first: bool, rounds: u32, ms: f64) {
+    pub(crate) fn take(&mut self, setting: Setting, first: bool, rounds: u32, ms: f64) {
+        let [i, j] = places(setting);
+        let own = &mut self.rounds[i][j];
         if first {
-            self.first_rounds = Some(rounds);
+            own.first_rounds = Some(rounds);
         }
         if rounds > 0 && ms.is_finite() {
             let newest = ms / f64::from(rounds);
-            let before = self.round_ms.unwrap_or(0.0);
-            self.round_ms = Some(newest.max(MEMORY * before));
+            let before = own.round_ms.unwrap_or(0.0);
+            own.round_ms = Some(newest.max(MEMORY * before));
         }
     }
+}
+
+fn places(setting: Setting) -> [usize; 2] {
+    [setting.first, setting.last].map(|step| (step.max(1).ilog2() as usize).min(2))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const ALL: Setting = Setting::ALL;
 
     #[test]
     fn the_bound_of_a_walk_follows_the_time_it_takes() {
@@ -95,35 +114,49 @@ mod tests {
     #[test]
     fn rounds_follow_the_time_they_take() {
         let mut schedule = Schedule::default();
-        assert_eq!(schedule.rounds(false, 8, 30.0), 1);
-        assert_eq!(schedule.rounds(false, 8, f32::INFINITY), 8);
-        schedule.take(false, 1, 10.0);
-        assert_eq!(schedule.rounds(false, 8, 30.0), 3);
-        schedule.take(false, 3, 300.0);
-        assert_eq!(schedule.rounds(false, 8, 30.0), 1);
+        assert_eq!(schedule.rounds(ALL, false, 8, 30.0), 1);
+        assert_eq!(schedule.rounds(ALL, false, 8, f32::INFINITY), 8);
+        schedule.take(ALL, false, 1, 10.0);
+        assert_eq!(schedule.rounds(ALL, false, 8, 30.0), 3);
+        schedule.take(ALL, false, 3, 300.0);
+        assert_eq!(schedule.rounds(ALL, false, 8, 30.0), 1);
         for _ in 0..20 {
-            schedule.take(false, 1, 0.01);
+            schedule.take(ALL, false, 1, 0.01);
         }
-        assert_eq!((schedule.rounds(false, 8, 30.0), schedule.rounds(false, 0, 30.0)), (8, 1));
-        schedule.take(false, 0, 1e9);
-        schedule.take(false, 1, f64::NAN);
-        assert_eq!(schedule.rounds(false, 8, 30.0), 8);
-        assert_eq!(schedule.rounds(false, 8, f32::NAN), 1);
+        assert_eq!(
+            (schedule.rounds(ALL, false, 8, 30.0), schedule.rounds(ALL, false, 0, 30.0)),
+            (8, 1)
+        );
+        schedule.take(ALL, false, 0, 1e9);
+        schedule.take(ALL, false, 1, f64::NAN);
+        assert_eq!(schedule.rounds(ALL, false, 8, 30.0), 8);
+        assert_eq!(schedule.rounds(ALL, false, 8, f32::NAN), 1);
     }
 
     #[test]
     fn first_passes_grow_by_a_round_from_frame_to_frame() {
         let mut schedule = Schedule::default();
-        schedule.take(true, 1, 0.1);
-        assert_eq!(schedule.rounds(true, 8, 30.0), 2);
-        assert_eq!(schedule.rounds(false, 8, 30.0), 8);
-        assert_eq!(schedule.rounds(true, 8, f32::INFINITY), 8);
-        schedule.take(true, 2, 0.1);
-        schedule.take(false, 1, 0.1);
-        assert_eq!(schedule.rounds(true, 8, 30.0), 3);
-        schedule.take(true, 0, 0.1);
-        assert_eq!(schedule.rounds(true, 8, 30.0), 1);
-        schedule.take(true, u32::MAX, 0.1);
-        assert_eq!(schedule.rounds(true, 8, 30.0), 8);
+        schedule.take(ALL, true, 1, 0.1);
+        assert_eq!(schedule.rounds(ALL, true, 8, 30.0), 2);
+        assert_eq!(schedule.rounds(ALL, false, 8, 30.0), 8);
+        assert_eq!(schedule.rounds(ALL, true, 8, f32::INFINITY), 8);
+        schedule.take(ALL, true, 2, 0.1);
+        schedule.take(ALL, false, 1, 0.1);
+        assert_eq!(schedule.rounds(ALL, true, 8, 30.0), 3);
+        schedule.take(ALL, true, 0, 0.1);
+        assert_eq!(schedule.rounds(ALL, true, 8, 30.0), 1);
+        schedule.take(ALL, true, u32::MAX, 0.1);
+        assert_eq!(schedule.rounds(ALL, true, 8, 30.0), 8);
+    }
+
+    #[test]
+    fn previews_have_times_of_their_own() {
+        let mut schedule = Schedule::default();
+        schedule.take(Setting { first: 4, last: 4, share: 0.0625 }, true, 1, 1.0);
+        assert_eq!(schedule.rounds(ALL, false, 8, 30.0), 1, "nothing is known of full pictures");
+        schedule.take(ALL, true, 1, 10.0);
+        let of =
+            |first, last| schedule.rounds(Setting { first, last, share: 0.0625 }, false, 8, 30.0);
+        assert_eq!([of(4, 4), of(4, 2), of(1, 1)], [8, 1, 3]);
     }
 }

@@ -49,7 +49,7 @@ fn the_numbers_of_a_run_agree_with_each_other() {
     let file = cli::path(&folder, "foveation.json");
     let written = cli::read_json(&file);
     let rows = |key: &str| written[key].as_array().unwrap().clone();
-    assert_eq!(rows("quality").len(), 8, "7 ways and the nearest pixel");
+    assert_eq!(rows("quality").len(), 10, "9 ways and the nearest pixel");
     rows("quality").iter().filter(|row| row["method"] != "unfinished").for_each(check_quality);
     check_rest(&rows("rest"));
     rows("speed").iter().for_each(check_speed);

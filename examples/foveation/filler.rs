@@ -18,6 +18,8 @@ pub struct Way {
     pub infill: Infill,
     pub sources: InfillSources,
     pub weights: Option<fn() -> &'static InfillWeights>,
+    /// At half the picture's resolution.
+    pub half: bool,
 }
 
 const EVERYTHING: InfillSources =
@@ -26,8 +28,13 @@ const NEIGHBOURS: InfillSources =
     InfillSources { neighbours: true, coarse_field: false, history: false };
 
 /// Leaves what was not sampled.
-pub const OFF: Way =
-    Way { name: "unfinished", infill: Infill::Off, sources: NEIGHBOURS, weights: None };
+pub const OFF: Way = Way {
+    name: "unfinished",
+    infill: Infill::Off,
+    sources: NEIGHBOURS,
+    weights: None,
+    half: false,
+};
 /// The sampled pixels around.
 pub const PUSH_PULL: Way = Way { name: "push-pull", infill: Infill::Classical, ..OFF };
 /// Those and the hits of the frame before.
@@ -35,7 +42,7 @@ pub const CLASSICAL_NO_COARSE: Way = Way {
     name: "classical-no-coarse",
     infill: Infill::Classical,
     sources: InfillSources { history: true, ..NEIGHBOURS },
-    weights: None,
+    ..OFF
 };
 /// The network for sparse masks.
 pub const SPARSE: Way = Way {
@@ -43,6 +50,7 @@ pub const SPARSE: Way = Way {
     infill: Infill::Network,
     sources: EVERYTHING,
     weights: Some(InfillWeights::trained_sparse),
+    half: false,
 };
 /// Without rays through the coarse field, which every hole would have to walk from its start.
 pub const SPARSE_NO_COARSE: Way = Way {
@@ -51,8 +59,13 @@ pub const SPARSE_NO_COARSE: Way = Way {
     ..SPARSE
 };
 
+/// Both at half the picture's resolution.
+pub const SPARSE_HALF: Way = Way { name: "network-sparse-half", half: true, ..SPARSE };
+pub const SPARSE_NO_COARSE_HALF: Way =
+    Way { name: "network-sparse-no-coarse-half", half: true, ..SPARSE_NO_COARSE };
+
 /// The first leaves what was not sampled.
-pub const WAYS: [Way; 7] = [
+pub const WAYS: [Way; 9] = [
     OFF,
     PUSH_PULL,
     CLASSICAL_NO_COARSE,
@@ -60,12 +73,19 @@ pub const WAYS: [Way; 7] = [
     Way { name: "network", weights: Some(InfillWeights::trained), ..SPARSE },
     SPARSE,
     SPARSE_NO_COARSE,
+    SPARSE_HALF,
+    SPARSE_NO_COARSE_HALF,
 ];
 
 impl Way {
     fn options(self) -> Option<InfillOptions> {
         let network = self.weights.map(|weights| weights());
-        let options = InfillOptions { sources: self.sources, network, ..Default::default() };
+        let options = InfillOptions {
+            sources: self.sources,
+            network,
+            half_resolution: self.half,
+            ..Default::default()
+        };
         (self.infill != Infill::Off).then_some(options)
     }
 }

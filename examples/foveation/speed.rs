@@ -6,7 +6,10 @@ use std::time::Instant;
 use progressive_iso::{Foveation, Outputs, RendererOptions, Residency};
 use serde::{Deserialize, Serialize};
 
-use crate::filler::{Filler, OFF, PUSH_PULL, SPARSE, SPARSE_NO_COARSE, Way, options};
+use crate::filler::{
+    Filler, OFF, PUSH_PULL, SPARSE, SPARSE_HALF, SPARSE_NO_COARSE, SPARSE_NO_COARSE_HALF, Way,
+    options,
+};
 use crate::sets::{Plan, SIGMA};
 use crate::support::{Failure, Gpu, median};
 use crate::view::{Place, Volume};
@@ -20,9 +23,10 @@ struct Case<'a> {
     fills: &'static [Way],
 }
 
-/// Without the coarse field, which takes longer than the full frame.
-const FILLS: &[Way] = &[PUSH_PULL, SPARSE_NO_COARSE];
-const ALL_FILLS: &[Way] = &[PUSH_PULL, SPARSE_NO_COARSE, SPARSE];
+/// Without the coarse field at full resolution, which takes longer than the full frame.
+const FILLS: &[Way] = &[PUSH_PULL, SPARSE_NO_COARSE, SPARSE_NO_COARSE_HALF, SPARSE_HALF];
+const ALL_FILLS: &[Way] =
+    &[PUSH_PULL, SPARSE_NO_COARSE, SPARSE_NO_COARSE_HALF, SPARSE_HALF, SPARSE];
 
 /// Medians of wall times from setting a frame to its report, and of how many times faster frames were than the full one
 /// before them.

@@ -151,7 +151,7 @@ pub fn speed_plot(rows: &[Speed]) -> Lines {
     }];
     type Curve = (&'static str, fn(&Speed) -> f64);
     let curves: [Curve; 2] =
-        [("tracing", |r| r.traced_speedup), ("with network", |r| r.fills[1].speedup)];
+        [("tracing", |r| r.traced_speedup), ("with network at half", |r| r.fills[2].speedup)];
     for (what, of) in curves {
         for volume in &volumes {
             let label = format!("{volume}, {what}");

@@ -45,6 +45,8 @@ macro_rules! entry {
 }
 
 const SCATTER: Module = entry!("scatter");
+const REDUCE: Module = entry!("reduce");
+const SPREAD: Module = entry!("spread");
 const GATE: Module = entry!("gate");
 const GUIDE: Module = entry!("guide");
 const MARK: Module = entry!("mark");
@@ -121,6 +123,19 @@ pub(crate) fn scatter() -> KernelSource {
     let scatter = Binding::Uniform { bytes: size_of::<ScatterParams>() as u64 };
     let bindings = vec![FRAME, FRAME, SHADING, PARAMS, scatter, READ, READ_WRITE, TEXTURE, TEXTURE];
     source("infill.scatter", SCATTER, bindings, &[])
+}
+
+/// What makes the reduced picture, and what shows it.
+pub(crate) fn reduction() -> [KernelSource; 2] {
+    let picture = |format| Binding::TextureWrite { format };
+    let mut reduce = vec![FRAME, READ, READ, READ_WRITE, READ_WRITE, TEXTURE, TEXTURE, TEXTURE];
+    reduce.push(COLOR);
+    reduce.push(picture(wgpu::TextureFormat::R32Float));
+    reduce.push(picture(wgpu::TextureFormat::Rgba16Float));
+    [
+        source("infill.reduce", REDUCE, reduce, &[]),
+        source("infill.spread", SPREAD, vec![FRAME, PARAMS, READ, READ, TEXTURE, COLOR], &[]),
+    ]
 }
 
 pub(crate) fn gate() -> KernelSource {

@@ -11,6 +11,7 @@ pub mod options;
 mod plan;
 #[cfg(feature = "published-network")]
 pub mod published;
+mod reduced;
 mod stage;
 pub mod weights;
 

@@ -2,15 +2,20 @@
 
 use gpu_primitives::wgpu;
 use macrocell::MacrocellPlan;
-use wavefront::FrameParams;
+use wavefront::cpu::frame::RayStates;
+use wavefront::{FrameParams, RayOrder};
 
 use crate::Error;
 use crate::kernels::{InfillParams, ScatterParams};
 use crate::options::{Look, Sources};
+use crate::reduced;
 use crate::weights::PackedWeights;
 
 /// Pixels on the edge of a tile.
 pub(crate) const TILE: u32 = 16;
+
+/// Pixels of the picture for one of a halved one in both directions.
+const HALF: u32 = 2;
 
 /// Levels of averages, from 2x2 pixels on.
 pub(crate) const LEVELS: usize = crate::cpu::push_pull::LEVELS;
@@ -34,7 +39,11 @@ const GUESS_BYTES: u64 = 8;
 /// What a scene's in-fill consists of and the sizes of everything that this crate allocates for it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct InfillPlan {
+    /// Of the pictures that it works on, and pixels of the picture for one of theirs in both directions.
     size: [u32; 2],
+    step: u32,
+    /// Numbers of a reduced picture's rays.
+    reduced_numbers: u64,
     sources: Sources,
     network: bool,
     code_pages: usize,
@@ -60,6 +69,8 @@ impl InfillPlan {
         let coarse_field = sources.coarse_field && code_pages <= MOST_CODE_PAGES && has_cells;
         let plan = Self {
             size,
+            step: 1,
+            reduced_numbers: 0,
             sources: Sources { coarse_field, ..sources },
             network,
             code_pages: if coarse_field { code_pages } else { 0 },
@@ -80,9 +91,40 @@ impl InfillPlan {
         Ok(plan)
     }
 
-    /// Width and height in pixels.
+    /// The same at half the picture's resolution: of 2x2 pixels one that is finished counts for all, and holes get the
+    /// colours between those of a quarter of the pixels. `None` for pictures that are too small.
+    #[must_use]
+    pub fn halved(&self) -> Option<Self> {
+        let order = RayOrder::new(self.size).preview(HALF).filter(|_| self.step == 1)?;
+        let size = self.size.map(|s| s.div_ceil(HALF));
+        Some(Self { size, step: HALF, reduced_numbers: order.numbers(), ..self.clone() })
+    }
+
+    /// Width and height of what it works on, in pixels.
     pub fn size(&self) -> [u32; 2] {
         self.size
+    }
+
+    /// Pixels of the picture for one of those in both directions: 1, or 2 if halved.
+    pub fn step(&self) -> u32 {
+        self.step
+    }
+
+    /// Numbers of a reduced picture's rays; 0 unless halved.
+    pub(crate) fn reduced_numbers(&self) -> u64 {
+        self.reduced_numbers
+    }
+
+    /// Header, states and active bits of a reduced picture's rays.
+    pub(crate) fn reduced_ray_bytes(&self) -> u64 {
+        RayStates::bytes(self.reduced_numbers)
+    }
+
+    /// Bytes of a reduced picture; 0 unless halved.
+    fn reduced_bytes(&self) -> u64 {
+        let textures = self.pixels() * reduced::OUTPUTS.bytes_per_pixel();
+        let beside = FrameParams::BYTES + reduced::ARGS_BYTES;
+        if self.step > 1 { self.reduced_ray_bytes() + textures + beside } else { 0 }
     }
 
     /// The sources that are in.
@@ -202,6 +244,7 @@ impl InfillPlan {
             + self.pulled_bytes()
             + 2 * (self.map_bytes() + self.quarter_bytes())
             + weights
+            + self.reduced_bytes()
             + size_of::<InfillParams>() as u64
     }
 

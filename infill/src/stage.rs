@@ -12,6 +12,7 @@ use crate::Error;
 use crate::kernels::{self, InfillParams, ScatterParams};
 use crate::options::Look;
 use crate::plan::{ARGS_BYTES, GATE_BYTES, InfillPlan};
+use crate::reduced::{ReduceKernels, Reduced};
 use crate::weights::{PackedWeights, Weights};
 
 /// Rays of one workgroup of the scatter.
@@ -40,6 +41,8 @@ pub struct Infill {
     guess: Option<Kernel>,
     classical: Kernel,
     network: Option<NetworkKernels>,
+    /// `None` unless it works at half the resolution.
+    reduction: Option<ReduceKernels>,
 }
 
 #[derive(Debug)]
@@ -70,6 +73,8 @@ pub struct InfillBuffers {
     guess: Option<wgpu::BindGroup>,
     classical: wgpu::BindGroup,
     network: Option<NetworkBinds>,
+    /// The reduced picture, and what shows it.
+    reduced: Option<(Reduced, wgpu::BindGroup)>,
     _scratch: Vec<Buffer>,
 }
 
@@ -127,6 +132,7 @@ impl Infill {
                 decode: make(kernels::decode()),
                 fill: make(kernels::fill(plan, true)),
             }),
+            reduction: (plan.step() > 1).then(|| ReduceKernels::new(device)),
         }
     }
 
@@ -146,12 +152,14 @@ impl Infill {
             all.extend([kernels::quarters(), kernels::decode()]);
             all.push(kernels::fill(plan, true));
         }
+        all.extend((plan.step() > 1).then(kernels::reduction).into_iter().flatten());
         all
     }
 
     /// Records the start of a frame, before its rays start: where the hits of the previous frame, whose rays and
     /// pictures are still there, fall in the picture of the next one. `follows`: there are such hits, of the same
-    /// volume and isovalue.
+    /// volume and isovalue. View and parameters are those of the rays that in-fill works on: if it is halved, of
+    /// [`FrameView::reduced`].
     pub fn record_start(
         &self,
         device: &wgpu::Device,
@@ -164,13 +172,24 @@ impl Infill {
     ) {
         let own = buffers.plan.params(look);
         upload.write(device, encoder, &buffers.params, 0, bytemuck::bytes_of(&own));
-        let (Some(history), Some(kernel)) = (&buffers.history, &self.scatter) else {
-            return;
-        };
-        encoder.clear_buffer(&history.keys, 0, None);
-        if !follows {
-            return;
+        if let (Some(history), Some(kernel)) = (&buffers.history, &self.scatter) {
+            encoder.clear_buffer(&history.keys, 0, None);
+            if follows {
+                Self::record_scatter(device, encoder, upload, (kernel, history), (view, params));
+            }
         }
+        if let Some((reduced, _)) = &buffers.reduced {
+            upload.write(device, encoder, &reduced.frame, 0, bytemuck::bytes_of(params));
+        }
+    }
+
+    fn record_scatter(
+        device: &wgpu::Device,
+        encoder: &mut wgpu::CommandEncoder,
+        upload: &mut UploadRing,
+        (kernel, history): (&Kernel, &History),
+        (view, params): (&FrameView, &FrameParams),
+    ) {
         let [column, row, w, depth] = view.pixel_from_index();
         let scatter = ScatterParams { column, row, w, depth };
         upload.write(device, encoder, &history.frame, 0, bytemuck::bytes_of(params));
@@ -187,6 +206,9 @@ impl Infill {
         buffers: &InfillBuffers,
         method: Method,
     ) {
+        if let (Some(kernels), Some((reduced, _))) = (&self.reduction, &buffers.reduced) {
+            kernels.record_reduce(encoder, reduced);
+        }
         encoder.clear_buffer(&buffers.tiles, 0, Some(4 * buffers.plan.tile_header_words()));
         encoder.clear_buffer(&buffers.args, 0, None);
         {
@@ -225,6 +247,9 @@ impl Infill {
             _ => (&self.classical, &buffers.classical),
         };
         over(&mut begin_pass(encoder, "infill.fill"), fill, bind, 0);
+        if let (Some(kernels), Some((reduced, spread))) = (&self.reduction, &buffers.reduced) {
+            kernels.record_spread(encoder, reduced, spread);
+        }
     }
 }
 
@@ -241,7 +266,39 @@ impl InfillBuffers {
         scene: Scene<'_>,
         weights: Option<&Weights>,
     ) -> Result<Self, Error> {
-        Maker { device, ledger, stage, plan, scene }.make(weights)
+        let reduced = match &stage.reduction {
+            Some(kernels) if plan.step() > 1 => {
+                let Scene { rays, textures, .. } = scene;
+                Some(Reduced::new(device, ledger, kernels, plan, rays, textures)?)
+            }
+            _ => None,
+        };
+        let Scene { rays, .. } = scene;
+        let work = match &reduced {
+            Some(Reduced { rays: own, frame, args, textures, .. }) => {
+                let numbers = plan.reduced_numbers();
+                Work { frame, shading: rays.shading(), rays: own, args, textures, numbers }
+            }
+            None => Work {
+                frame: rays.frame(),
+                shading: rays.shading(),
+                rays: rays.rays(),
+                args: rays.active_args(),
+                textures: scene.textures,
+                numbers: rays.plan().numbers(),
+            },
+        };
+        let mut buffers =
+            Maker { device, ledger, stage, plan, ranges: scene.ranges, work }.make(weights)?;
+        buffers.reduced = match (reduced, &stage.reduction) {
+            (Some(reduced), Some(kernels)) => {
+                let own = [&*buffers.params, &*buffers.gate_args];
+                let spread = kernels.bind_spread(device, &reduced, own, rays, scene.textures);
+                Some((reduced, spread))
+            }
+            _ => None,
+        };
+        Ok(buffers)
     }
 
     /// Where the number of filled pixels is after a fill: buffer, byte offset, bytes.
@@ -272,7 +329,20 @@ struct Maker<'a> {
     ledger: &'a Ledger,
     stage: &'a Infill,
     plan: &'a InfillPlan,
-    scene: Scene<'a>,
+    ranges: &'a RangeBuffers,
+    work: Work<'a>,
+}
+
+/// What in-fill works on: a picture's rays and textures, or those of the reduced one.
+#[derive(Clone, Copy)]
+struct Work<'a> {
+    frame: &'a wgpu::Buffer,
+    shading: &'a wgpu::Buffer,
+    rays: &'a wgpu::Buffer,
+    args: &'a wgpu::Buffer,
+    textures: &'a OutputTextures,
+    /// Of the rays.
+    numbers: u64,
 }
 
 /// Memory of the network.
@@ -309,7 +379,7 @@ impl Maker<'_> {
     }
 
     fn views(&self) -> Result<[wgpu::BindingResource<'_>; 2], Error> {
-        let textures = self.scene.textures;
+        let textures = self.work.textures;
         let (depth, normal) = (textures.depth_view(), textures.normal_view());
         let (Some(depth), Some(normal)) = (depth, normal) else {
             return Err(Error::MissingOutputs);
@@ -319,7 +389,8 @@ impl Maker<'_> {
 
     fn make(&self, weights: Option<&Weights>) -> Result<InfillBuffers, Error> {
         let plan = self.plan;
-        let Scene { rays, ranges, textures } = self.scene;
+        let (Work { frame, shading, rays, args: active_args, textures, .. }, ranges) =
+            (self.work, self.ranges);
         let [depth, normals] = self.views()?;
         let tiles = self.storage("infill.tiles", plan.tile_bytes());
         let args_usage = wgpu::BufferUsages::STORAGE
@@ -335,25 +406,20 @@ impl Maker<'_> {
         let bind = |kernel: &Kernel, label: &str, resources: &[wgpu::BindingResource<'_>]| {
             kernel.bind(self.device, label, resources)
         };
-        let own = || [rays.frame().as_entire_binding(), params.as_entire_binding()];
-        let mark =
-            [&own()[..], &[rays.rays().as_entire_binding(), tiles.as_entire_binding()]].concat();
+        let own = || [frame.as_entire_binding(), params.as_entire_binding()];
+        let mark = [&own()[..], &[rays.as_entire_binding(), tiles.as_entire_binding()]].concat();
         let push = [
             &own()[..],
-            &[
-                rays.rays().as_entire_binding(),
-                tiles.as_entire_binding(),
-                averages.as_entire_binding(),
-            ],
+            &[rays.as_entire_binding(), tiles.as_entire_binding(), averages.as_entire_binding()],
             &[depth.clone(), normals.clone()],
         ]
         .concat();
         let calibrate = [&mark[..], &[depth, normals], &coarse_field(ranges)].concat();
         let pixel = [
-            rays.frame().as_entire_binding(),
-            rays.shading().as_entire_binding(),
+            frame.as_entire_binding(),
+            shading.as_entire_binding(),
             params.as_entire_binding(),
-            rays.rays().as_entire_binding(),
+            rays.as_entire_binding(),
             tiles.as_entire_binding(),
         ];
         let guess = [&pixel[..], &[guesses.as_entire_binding()], &coarse_field(ranges)].concat();
@@ -387,8 +453,8 @@ impl Maker<'_> {
         let counts = [tiles.as_entire_binding(), args.as_entire_binding()];
         let gate = [
             params.as_entire_binding(),
-            rays.rays().as_entire_binding(),
-            rays.active_args().as_entire_binding(),
+            rays.as_entire_binding(),
+            active_args.as_entire_binding(),
             gate_args.as_entire_binding(),
         ];
         let binds = InfillBuffers {
@@ -409,6 +475,7 @@ impl Maker<'_> {
             gate_args,
             params,
             history,
+            reduced: None,
             _scratch: Vec::new(),
         };
         scratch.extend([averages, pulled, guesses]);
@@ -421,24 +488,24 @@ impl Maker<'_> {
         [depth, normals]: [wgpu::BindingResource<'_>; 2],
     ) -> Option<History> {
         let kernel = self.stage.scatter.as_ref()?;
-        let rays = self.scene.rays;
+        let Work { frame: old_frame, shading, rays, .. } = self.work;
         let keys = self.storage("infill.history", self.plan.history_bytes());
         let frame = self.uniform("infill.history.frame", FrameParams::BYTES);
         let bytes = size_of::<ScatterParams>() as u64;
         let scatter_params = self.uniform("infill.history.scatter", bytes);
         let resources = [
-            rays.frame().as_entire_binding(),
+            old_frame.as_entire_binding(),
             frame.as_entire_binding(),
-            rays.shading().as_entire_binding(),
+            shading.as_entire_binding(),
             params.as_entire_binding(),
             scatter_params.as_entire_binding(),
-            rays.rays().as_entire_binding(),
+            rays.as_entire_binding(),
             keys.as_entire_binding(),
             depth,
             normals,
         ];
         let scatter = kernel.bind(self.device, "infill.scatter", &resources);
-        let groups = rays.plan().numbers().div_ceil(RAYS_PER_GROUP);
+        let groups = self.work.numbers.div_ceil(RAYS_PER_GROUP);
         Some(History { keys, frame, scatter_params, scatter, groups })
     }
 

@@ -8,9 +8,9 @@ use super::work::Work;
 pub(super) const FEATURES: usize = 10;
 /// Work of starting a ray, of filling a pixel, of making a pixel from a preview and of decoding a coarse cell, in visits of a
 /// block, before anything was learned.
-const START_WORK: f64 = 0.2;
+const START_WORK: f64 = 0.3;
 const FILL_WORK: f64 = 2.5;
-const UPSCALE_WORK: f64 = 0.12;
+const UPSCALE_WORK: f64 = 0.15;
 const DECODE_WORK: f64 = 2000.0;
 /// Part of what is decoded that a doubled look-ahead adds, before anything was learned.
 const LOOK_AHEAD_WORK: f64 = 0.25;

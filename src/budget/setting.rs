@@ -18,6 +18,9 @@ pub(crate) struct Setting {
 const WHOLE: f64 = 0.8;
 
 impl Setting {
+    /// All rays at once.
+    pub(crate) const ALL: Self = Self { first: 1, last: 1, share: 1.0 };
+
     /// The setting for a share. Preview upon preview is made until the next one would have fewer rays than are wanted; `steps`
     /// are those that there may be, ascending from 1.
     pub(super) fn new(share: f64, steps: &[u32]) -> Self {

@@ -1,11 +1,11 @@
 //! What a pass records of the current frame.
 
 use infill::Method;
-use wavefront::{OutputTextures, SamplingParams, ShadingParams};
+use wavefront::{OutputTextures, ShadingParams};
 
-use super::frame_state::FrameState;
+use super::frame_state::{FrameState, ShownHits};
 use super::{Phase, ProgressiveIsoRenderer, WARM_MISSES};
-use crate::budget::{Request, Sampling};
+use crate::budget::{Request, Sampling, Setting};
 use crate::casting::Recorder;
 use crate::records::PassRecords;
 use crate::schedule::Schedule;
@@ -116,7 +116,7 @@ struct Pass<'a> {
     plan: &'a ScenePlan,
     schedule: &'a Schedule,
     world_from_index: [[f64; 4]; 4],
-    shown: &'a mut Vec<(u32, f32)>,
+    shown: &'a mut ShownHits,
     state: &'a mut FrameState,
 }
 
@@ -124,15 +124,18 @@ impl Pass<'_> {
     /// Records the frame's first rays, and those with which it goes on from a preview at once.
     fn record_first(&mut self) {
         self.record_rays();
-        self.record_rounds(true);
+        let setting = self.state.choice.map_or(Setting::ALL, |choice| choice.setting);
+        let rounds = self.rounds(setting);
+        let goes_on = setting.last < setting.first;
+        // The rest is for what it goes on with, one at least.
+        let first = if goes_on { rounds.saturating_sub(1).max(1) } else { rounds };
+        self.record_rounds(first);
         self.record_fill();
-        if let Some(choice) = self.state.choice
-            && choice.setting.last < choice.setting.first
-        {
-            self.record_upscale(choice.setting.last);
-            self.state.sampling = choice.setting.last_sampling();
-            self.record_resume(choice.setting.last, self.state.sampling());
-            self.record_rounds(true);
+        if goes_on {
+            self.record_upscale(setting.last);
+            self.state.sampling = setting.last_sampling();
+            self.record_resume(setting.last, 0);
+            self.record_rounds(rounds.saturating_sub(first).max(1));
         }
         self.state.passes = 1;
         if self.state.step > 1 {
@@ -142,23 +145,23 @@ impl Pass<'_> {
 
     /// Records what a pass after the first one casts beside what there is.
     fn record_further(&mut self) {
-        let sampling = self.state.sampling();
+        let pass = self.state.passes;
         self.state.passes += 1;
         if self.state.step > 1 {
-            self.record_resume(1, sampling);
+            self.record_resume(1, pass);
         } else {
-            if self.state.passes == 2 && self.state.choice.is_some() {
+            if pass == 1 && self.state.choice.is_some() {
                 // From now on the frame looks as far ahead as it is asked to.
                 let Recorder { device, encoder, upload, .. } = &mut self.to;
                 let params = self.state.params(self.plan);
                 self.rendering.casting(1).rays().record_params(device, encoder, upload, &params);
             }
-            if let Some(sampling) = sampling {
+            if let Some(sampling) = self.state.sampling(pass) {
                 self.state.lists += 1;
                 self.rendering.casting(1).record_mask(&mut self.to, &sampling);
             }
         }
-        self.record_rounds(false);
+        self.record_rounds(self.rounds(Setting::ALL));
         self.record_fill();
     }
 
@@ -172,10 +175,12 @@ impl Pass<'_> {
 
     /// Records the start of the frame's first rays.
     fn record_rays(&mut self) {
-        self.record_infill_start();
+        let isovalue = self.state.frame.isovalues[0];
+        let follows = self.shown.replace(self.state.step, isovalue) == Some(isovalue);
+        self.record_infill_start(follows);
         let (rendering, params, shading) =
             (self.rendering, self.state.params(self.plan), self.shading());
-        let sampling = self.state.sampling();
+        let sampling = self.state.sampling(0);
         let preview = rendering.preview(self.state.step);
         let textures = preview.map_or(self.textures, |preview| &preview.textures);
         let casting = rendering.casting(self.state.step);
@@ -183,12 +188,9 @@ impl Pass<'_> {
         self.state.lists += 1;
     }
 
-    /// Records what in-fill needs of the rays that are about to start.
-    fn record_infill_start(&mut self) {
-        let (state, isovalue) = (&self.state, self.state.frame.isovalues[0]);
-        let shows = |(step, _): &(u32, f32)| *step == state.step;
-        let follows = self.shown.iter().position(shows).map(|at| self.shown.swap_remove(at).1);
-        self.shown.push((state.step, isovalue));
+    /// Records what in-fill needs of the rays that are about to start; `follows`: their pictures show hits of the isovalue.
+    fn record_infill_start(&mut self, follows: bool) {
+        let state = &self.state;
         let options = &state.frame.options;
         if options.infill == Infill::Off && !options.guided {
             return;
@@ -197,25 +199,32 @@ impl Pass<'_> {
             from_completeness: options.stop_at.map_or(0.0, |stop| stop.0),
             crisp: options.crisp_infill,
         };
-        let follows = follows == Some(isovalue) && !state.is_resumed();
-        let next = (&state.ray_view(), &state.params(self.plan));
+        let view = match &self.plan.infill {
+            Some(infill) if state.step == 1 => state.view.reduced(infill.step()),
+            _ => state.ray_view(),
+        };
+        let next = (&view, &state.params_of(&view, self.plan));
         let casting = self.rendering.casting(state.step);
         casting.record_infill_start(&mut self.to, next, follows, look);
     }
 
-    /// Records as many rounds as fit.
-    fn record_rounds(&mut self, first: bool) {
+    /// As many rounds as fit into a pass of a setting.
+    fn rounds(&self, setting: Setting) -> u32 {
         let options = &self.state.frame.options;
         let pass_ms = options.pass_ms.min(options.target_ms.unwrap_or(f32::INFINITY));
-        // What rounds take is counted as with all of the picture's rays.
-        let pass_ms = pass_ms * (self.state.step * self.state.step) as f32;
-        for _ in 0..self.schedule.rounds(first, options.rounds_per_pass, pass_ms) {
+        let is_first = self.state.passes == 0;
+        self.schedule.rounds(setting, is_first, options.rounds_per_pass, pass_ms)
+    }
+
+    fn record_rounds(&mut self, rounds: u32) {
+        let guided = self.state.frame.options.guided;
+        for _ in 0..rounds {
             self.state.rounds += 1;
             let _span =
                 tracing::debug_span!("progressive_iso.round", round = self.state.rounds).entered();
             let casting = self.rendering.casting(self.state.step);
             let Recorder { encoder, stages, .. } = &mut self.to;
-            self.rendering.record_round(encoder, stages, casting, options.guided);
+            self.rendering.record_round(encoder, stages, casting, guided);
         }
     }
 
@@ -233,6 +242,8 @@ impl Pass<'_> {
 
     /// Records making the pictures with every `step`-th pixel from the preview.
     fn record_upscale(&mut self, step: u32) {
+        // They show no hits that history could follow from.
+        self.shown.forget(step);
         let finer = self.rendering.preview(step);
         let textures = finer.map_or(self.textures, |preview| &preview.textures);
         let (shading, crisp) = (self.shading(), self.state.frame.options.crisp_infill);
@@ -241,13 +252,16 @@ impl Pass<'_> {
         }
     }
 
-    /// Records that the frame goes on with the rays of every `step`-th pixel.
-    fn record_resume(&mut self, step: u32, sampling: Option<SamplingParams>) {
+    /// Records that the frame goes on with the rays of every `step`-th pixel, in pass `pass`, counted from 0.
+    fn record_resume(&mut self, step: u32, pass: u32) {
         let Some(preview) = self.rendering.preview(self.state.step) else { return };
         self.state.resumed_step = self.state.step / step;
         self.state.step = step;
         self.state.lists += 1;
-        self.record_infill_start();
+        if self.state.frame.options.guided {
+            self.record_infill_start(false);
+        }
+        let sampling = self.state.sampling(pass);
         let view = (&self.state.params(self.plan), &self.shading());
         let next = (step, self.rendering.casting(step));
         preview.record_resume(&mut self.to, next, view, sampling.as_ref());

@@ -5,6 +5,30 @@ use wavefront::{FrameParams, FrameView, LookAhead, SamplingParams};
 use crate::budget::{Choice, Sampling};
 use crate::{Frame, ScenePlan};
 
+/// Isovalues of the hits that the rays of each step have found last, as long as their pictures show those.
+#[derive(Debug, Default)]
+pub(super) struct ShownHits([Option<f32>; 3]);
+
+impl ShownHits {
+    fn at(&mut self, step: u32) -> &mut Option<f32> {
+        &mut self.0[(step.max(1).ilog2() as usize).min(2)]
+    }
+
+    /// The pictures begin to show those of another isovalue; that of those before.
+    pub(super) fn replace(&mut self, step: u32, isovalue: f32) -> Option<f32> {
+        self.at(step).replace(isovalue)
+    }
+
+    /// The pictures show something else.
+    pub(super) fn forget(&mut self, step: u32) {
+        *self.at(step) = None;
+    }
+
+    pub(super) fn clear(&mut self) {
+        *self = Self::default();
+    }
+}
+
 /// A frame and how far it is.
 #[derive(Debug)]
 pub(super) struct FrameState {
@@ -34,12 +58,12 @@ pub(super) struct FrameState {
 }
 
 impl FrameState {
-    /// What the next pass adds to the sampling mask of a foveated frame, if anything.
-    pub(super) fn sampling(&self) -> Option<SamplingParams> {
+    /// What pass `pass`, counted from 0, adds to the sampling mask of the rays that are cast, if anything.
+    pub(super) fn sampling(&self, pass: u32) -> Option<SamplingParams> {
         let Sampling { foveation, lattice } = self.sampling?;
         let size = self.ray_view().ray_size();
-        let params = SamplingParams::new(&foveation, size, self.number, self.passes);
-        (self.passes < foveation.passes).then(|| params.with_lattice(lattice))
+        let params = SamplingParams::new(&foveation, size, self.number, pass);
+        (pass < foveation.passes).then(|| params.with_lattice(lattice))
     }
 
     /// Whether its rays go on from a preview, which unfinished pixels show.
@@ -62,8 +86,12 @@ impl FrameState {
     }
 
     pub(super) fn params(&self, plan: &ScenePlan) -> FrameParams {
+        self.params_of(&self.ray_view(), plan)
+    }
+
+    /// The parameters of rays with another view.
+    pub(super) fn params_of(&self, view: &FrameView, plan: &ScenePlan) -> FrameParams {
         let (grid, lru) = (plan.macrocell.grid(), plan.samples.params());
-        let view = self.ray_view();
         let params = view.params(grid, lru, self.frame.isovalues[0], self.look_ahead());
         params.with_most_cells(self.most_cells).after_preview(self.resumed_step)
     }

@@ -8,9 +8,9 @@ use infill::cpu::reproject::{self, EMPTY, OldHit};
 use infill::{Sources, Weights};
 use macrocell::Grid;
 use progressive_iso::{
-    BlockSortedOptions, BlueNoise, Camera, Capture, Completeness, Error, Foveation, Frame,
-    FrameOptions, FrameView, Infill, InfillOptions, InfillWhen, PassReport, PixelStatus,
-    ProgressiveIsoRenderer, RendererOptions, Residency, TraversalStrategy,
+    BlockSortedOptions, BlueNoise, Camera, Capture, Completeness, Error, Frame, FrameOptions,
+    FrameView, Infill, InfillOptions, InfillWhen, PassReport, PixelStatus, ProgressiveIsoRenderer,
+    RendererOptions, Residency, TraversalStrategy,
 };
 use wavefront::cpu::frame::{FrameRay, RayStates};
 use wavefront::cpu::shading;
@@ -19,20 +19,20 @@ use wavefront::{FrameParams, LookAhead, ShadingParams};
 use crate::suite::random::Random;
 use crate::support::{self, Gpu, Scene, options};
 
-const SIZE: [u32; 2] = [151, 109];
+pub(crate) const SIZE: [u32; 2] = [151, 109];
 
-fn with_infill(infill: InfillOptions) -> RendererOptions {
+pub(crate) fn with_infill(infill: InfillOptions) -> RendererOptions {
     RendererOptions { infill: Some(infill), ..options(SIZE) }
 }
 
-fn frame_with(scene: &Scene, azimuth: f64, infill: Infill) -> Frame {
+pub(crate) fn frame_with(scene: &Scene, azimuth: f64, infill: Infill) -> Frame {
     let frame = scene.frame(scene.orbit(azimuth, 25.0, SIZE));
     let options = FrameOptions { infill, look_ahead: 1, ..frame.options };
     Frame { options, ..frame }
 }
 
 /// Renders passes of one frame until `share` of the pixels is finished.
-fn render_until(
+pub(crate) fn render_until(
     gpu: &Gpu,
     renderer: &mut ProgressiveIsoRenderer,
     frame: &Frame,
@@ -46,7 +46,7 @@ fn render_until(
         .unwrap()
 }
 
-fn capture(gpu: &Gpu, renderer: &ProgressiveIsoRenderer) -> Capture {
+pub(crate) fn capture(gpu: &Gpu, renderer: &ProgressiveIsoRenderer) -> Capture {
     renderer.capture_blocking(&gpu.device, &gpu.queue).unwrap()
 }
 
@@ -55,25 +55,39 @@ fn pixels() -> impl Iterator<Item = [u32; 2]> {
 }
 
 /// What the twin needs of a frame.
-struct View {
-    params: FrameParams,
+pub(crate) struct View {
+    pub(crate) params: FrameParams,
     shading: ShadingParams,
     view: FrameView,
     grid: Grid,
+    isovalue: f32,
 }
 
 impl View {
-    fn new(scene: &Scene, frame: &Frame) -> Self {
+    pub(crate) fn new(scene: &Scene, frame: &Frame) -> Self {
         let dims = scene.volume.dims;
         let view = FrameView::new(&frame.camera, SIZE, scene.world_from_index, dims).unwrap();
-        let grid = Grid::new(dims);
-        let lru = lru_cache_gpu::LruParams::zeroed();
-        let params = view.params(grid, lru, frame.isovalues[0], LookAhead::NONE);
         let shading = ShadingParams::new(&frame.options.shading, scene.world_from_index);
-        Self { params, shading, view, grid }
+        Self::of(view, shading, Grid::new(dims), frame.isovalues[0])
     }
 
-    fn finished(capture: &Capture) -> Vec<Option<Finished>> {
+    fn of(view: FrameView, shading: ShadingParams, grid: Grid, isovalue: f32) -> Self {
+        let lru = lru_cache_gpu::LruParams::zeroed();
+        let params = view.params(grid, lru, isovalue, LookAhead::NONE);
+        Self { params, shading, view, grid, isovalue }
+    }
+
+    /// That of the picture at half the resolution.
+    pub(crate) fn halved(&self) -> Self {
+        Self::of(self.view.reduced(2), self.shading, self.grid, self.isovalue)
+    }
+
+    pub(crate) fn pixels(&self) -> impl Iterator<Item = [u32; 2]> + use<> {
+        let [width, height] = self.params.size();
+        (0..width * height).map(move |i| [i % width, i / width])
+    }
+
+    pub(crate) fn finished(capture: &Capture) -> Vec<Option<Finished>> {
         let (status, depth) = (capture.status.as_ref().unwrap(), capture.depth.as_ref().unwrap());
         let normal = capture.normal.as_ref().unwrap();
         (0..status.len())
@@ -85,12 +99,12 @@ impl View {
             .collect()
     }
 
-    /// Keys of the hits of an older capture.
-    fn history(&self, old: &View, capture: &Capture) -> Vec<u32> {
+    /// Keys of the hits of an older picture.
+    pub(crate) fn history(&self, old: &View, known: &[Option<Finished>]) -> Vec<u32> {
         let rows = self.view.pixel_from_index();
-        let mut keys = vec![EMPTY; (SIZE[0] * SIZE[1]) as usize];
-        for (pixel, finished) in pixels().zip(Self::finished(capture)) {
-            let Some(Finished::Hit { depth, normal }) = finished else { continue };
+        let mut keys = vec![EMPTY; known.len()];
+        for (pixel, finished) in self.pixels().zip(known) {
+            let &Some(Finished::Hit { depth, normal }) = finished else { continue };
             let ray = FrameRay::new(&old.params, pixel);
             let t = ray.t(&old.params, depth);
             let position = [0, 1, 2].map(|a| ray.ray.origin[a] + t * ray.ray.direction[a]);
@@ -98,18 +112,18 @@ impl View {
             if let Some(([x, y], key)) =
                 reproject::key(&self.params, &self.grid, &rows, &self.shading, &hit)
             {
-                let least = &mut keys[(x + SIZE[0] * y) as usize];
+                let least = &mut keys[(x + self.params.size()[0] * y) as usize];
                 *least = key.min(*least);
             }
         }
         keys
     }
 
-    /// What the twin shows in the holes of a capture.
-    fn fill(
+    /// What the twin shows in the holes of a picture.
+    pub(crate) fn fill(
         &self,
         scene: &Scene,
-        capture: &Capture,
+        known: &[Option<Finished>],
         states: &[u32],
         history: Option<&[u32]>,
         sources: Sources,
@@ -118,9 +132,9 @@ impl View {
         let ranges = macrocell::cpu::ranges::build(&self.grid, &scene.volume.decode());
         let field = CoarseField::new(&self.grid, &ranges);
         let states = RayStates::new(&self.params, states);
-        let known = Self::finished(capture);
-        let t_low: Vec<f32> = pixels()
-            .zip(&known)
+        let t_low: Vec<f32> = self
+            .pixels()
+            .zip(known)
             .map(|(pixel, known)| if known.is_none() { states.t_low(pixel) } else { 0.0 })
             .collect();
         let twin = Twin {
@@ -128,7 +142,7 @@ impl View {
             shading: &self.shading,
             grid: self.grid,
             field: Some(&field),
-            pixels: &known,
+            pixels: known,
             t_low: &t_low,
             history,
             sources,
@@ -137,7 +151,7 @@ impl View {
     }
 
     /// The colour of a filled pixel in bytes, not rounded.
-    fn color(&self, pixel: [u32; 2], filled: &Filled, background: [f32; 4]) -> [f32; 3] {
+    pub(crate) fn color(&self, pixel: [u32; 2], filled: &Filled, background: [f32; 4]) -> [f32; 3] {
         let direction = FrameRay::new(&self.params, pixel).ray.direction;
         let to_viewer = shading::to_viewer(&self.shading, direction);
         let color = shading::shade(&self.shading, filled.normal, to_viewer);
@@ -214,10 +228,11 @@ impl Case {
         let cut = capture(&gpu, &renderer);
         let states = kit::read_u32s(&gpu.device, &gpu.queue, renderer.rays().unwrap().rays());
         let (before, view) = (View::new(&scene, &first), View::new(&scene, &second));
-        let keys = view.history(&before, &old);
+        let keys = view.history(&before, &View::finished(&old));
         let zero = Weights::zero();
         let weights = weights.unwrap_or(&zero);
-        let twin = view.fill(&scene, &cut, &states, Some(&keys), sources, weights);
+        let known = View::finished(&cut);
+        let twin = view.fill(&scene, &known, &states, Some(&keys), sources, weights);
         let filled = twin.iter().flatten().count();
         assert_eq!(report.filled_pixels as usize, filled, "{sources:?}");
         assert_eq!(report.exact_pixels() + report.active_rays, SIZE[0] * SIZE[1]);
@@ -243,7 +258,7 @@ fn holes_get_the_twins_colours_with_every_set_of_sources() {
 }
 
 /// Weights of about the size that training gives.
-fn random_weights(seed: u64) -> &'static Weights {
+pub(crate) fn random_weights(seed: u64) -> &'static Weights {
     let mut random = Random::new(seed);
     Box::leak(Box::new(Weights::from_fn(|_| random.between(-0.25, 0.25) as f32)))
 }
@@ -277,7 +292,8 @@ fn the_comparison_notices_another_network() {
     let view = View::new(&scene, &frame);
     let wrong = |seed| {
         let weights = random_weights(seed);
-        let twin = view.fill(&scene, &cut, &states, None, Sources::default(), weights);
+        let known = View::finished(&cut);
+        let twin = view.fill(&scene, &known, &states, None, Sources::default(), weights);
         differences(&view, &cut, &twin, &frame, 4.0).0
     };
     assert_eq!(wrong(1), 0);
@@ -564,35 +580,5 @@ fn guided_requests_change_no_bit_of_the_finished_picture() {
             // The guide does ask for more, unless the slots are too few for that.
             assert!(slots < 1000 || plain.1 != guided.1);
         }
-    }
-}
-
-#[test]
-fn a_resized_picture_is_filled_as_one_of_that_size() {
-    let gpu = Gpu::new();
-    let scene = Scene::generated("turbulence", [70, 66, 61], 8.0);
-    let foveation = Some(BlueNoise::tiles());
-    let of = |size| {
-        let sources = Sources { history: false, ..Sources::default() };
-        let options = with_infill(InfillOptions { sources, ..Default::default() });
-        let residency = Residency::Full;
-        gpu.renderer(&scene, RendererOptions { size, foveation, residency, ..options })
-    };
-    let mut frame = frame_with(&scene, 20.0, Infill::Classical);
-    frame.options.foveation = Some(Foveation::default());
-    let shown = |renderer: &mut ProgressiveIsoRenderer| {
-        renderer.set_frame(&frame).unwrap();
-        let (device, queue) = (&gpu.device, &gpu.queue);
-        renderer.render_to_completion(device, queue, |_, report| report.pass == 0).unwrap();
-        capture(&gpu, renderer).color
-    };
-    // The third frame, whose mask another one does not have; changing the size starts a frame.
-    let mut unchanged = of(SIZE);
-    let expected = [(); 3].map(|()| shown(&mut unchanged))[2].clone();
-    for other in [[SIZE[0] / 2, SIZE[1] / 2], [2 * SIZE[0], SIZE[1] + 7]] {
-        let mut resized = of(other);
-        assert_ne!(shown(&mut resized), expected);
-        resized.resize(&gpu.device, SIZE).unwrap();
-        assert_eq!(shown(&mut resized), expected, "{other:?}");
     }
 }

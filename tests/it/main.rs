@@ -13,6 +13,7 @@ mod errors;
 mod faults;
 mod foveation;
 mod frame_budget;
+mod half_infill;
 mod infill;
 mod invariance;
 mod left_out;

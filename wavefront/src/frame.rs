@@ -131,6 +131,8 @@ pub struct FrameView {
     /// Size of the picture, and pixels of it from one ray to the next.
     size: [u32; 2],
     step: u32,
+    /// Pixels from the centre of the first pixel to the first ray.
+    shift: f64,
     /// Index-space start of the central ray and its change per pixel.
     origin: [DVec3; 3],
     /// Index-space direction per unit of view depth of the central ray and its change per pixel.
@@ -191,6 +193,7 @@ impl FrameView {
         Ok(Self {
             size,
             step: 1,
+            shift: 0.0,
             origin: per_pixel([start(0), start(1), start(2)]),
             direction: per_pixel([along(0), along(1), along(2)]),
             start_depth,
@@ -205,7 +208,14 @@ impl FrameView {
     /// power of two.
     #[must_use]
     pub fn preview(&self, step: u32) -> Self {
-        Self { step: step.max(1), ..*self }
+        Self { step: step.max(1), shift: 0.0, ..*self }
+    }
+
+    /// The view of a picture with a pixel for `step` x `step` of these, a power of two: its rays go through their middles.
+    #[must_use]
+    pub fn reduced(&self, step: u32) -> Self {
+        let own = f64::from(self.step) * 0.5 * (f64::from(step.max(1)) - 1.0);
+        Self { step: self.step * step.max(1), shift: self.shift + own, ..*self }
     }
 
     /// Rays in a row and in a column.
@@ -225,7 +235,9 @@ impl FrameView {
         let LookAhead { blocks: look_ahead, first_misses } = look_ahead;
         let narrow = |v: DVec3| v.as_vec3().to_array();
         let order = RayOrder::new(self.size);
-        let order = order.preview(self.step).unwrap_or(order);
+        let preview = order.preview(self.step);
+        debug_assert!(preview.is_some(), "a step that `WavefrontPlan::preview` refuses");
+        let order = preview.unwrap_or(order);
         let [width, height] = self.ray_size();
         let [volume_low, volume_end] = self.volume_pixels(grid.last_cell());
         FrameParams {
@@ -249,7 +261,7 @@ impl FrameView {
             shift_z,
             shift_misses,
             most_cells: FrameParams::MOST_CELLS,
-            middle: self.size.map(|s| 0.5 * s as f32),
+            middle: self.size.map(|s| (0.5 * f64::from(s) - self.shift) as f32),
             step: self.step as f32,
             preview_level: 0,
             volume_low,
@@ -262,7 +274,7 @@ impl FrameView {
     /// The ray through the centre of pixel (x, y), row 0 on top: start in index space and unit
     /// direction, in f64, and the view depth gained per voxel.
     pub fn ray(&self, pixel: [u32; 2]) -> ([f64; 3], [f64; 3], f64) {
-        let place = pixel.map(|p| f64::from(p) * f64::from(self.step) + 0.5);
+        let place = pixel.map(|p| f64::from(p) * f64::from(self.step) + 0.5 + self.shift);
         let [x, y] = [0, 1].map(|a| place[a] - f64::from(self.size[a]) / 2.0);
         let at = |v: &[DVec3; 3]| v[0] + v[1] * x + v[2] * y;
         let direction = at(&self.direction);
@@ -319,8 +331,8 @@ impl FrameView {
         let clip = (self.clip_from_view * self.view_from_index).transpose();
         let step = f64::from(self.step);
         let [width, height] = self.size.map(|s| f64::from(s) / step);
-        // The first ray's pixel has its centre at a half of the picture's pixels, and of the preview's.
-        let first = clip.w_axis * (0.5 - 0.5 / step);
+        // The first ray's place is a half of its own pixels, and a half and the shift of the picture's.
+        let first = clip.w_axis * (0.5 - (0.5 + self.shift) / step);
         let column = (clip.x_axis + clip.w_axis) * (0.5 * width) + first;
         let row = (clip.w_axis - clip.y_axis) * (0.5 * height) + first;
         let depth = -self.view_from_index.row(2);

@@ -115,7 +115,8 @@ impl Outputs {
     }
 
     /// Bytes per pixel of all pictures.
-    pub(crate) fn bytes_per_pixel(self) -> u64 {
+    #[must_use]
+    pub fn bytes_per_pixel(self) -> u64 {
         self.formats().map(|p| u64::from(p.format.block_copy_size(None).unwrap_or(0))).sum()
     }
 

@@ -10,6 +10,7 @@ pub mod network;
 #[cfg(feature = "published-network")]
 pub mod published;
 pub mod push_pull;
+pub mod reduced;
 pub mod reproject;
 
 pub use candidate::Candidate;

@@ -59,6 +59,12 @@ impl<'a> RayStates<'a> {
         }
     }
 
+    /// Bytes of header, states and active bits of rays with so many numbers.
+    #[must_use]
+    pub fn bytes(numbers: u64) -> u64 {
+        4 * (RAYS_HEADER_WORDS + numbers + numbers / 32)
+    }
+
     /// Whether a pixel's ray is not finished.
     pub fn is_active(&self, pixel: [u32; 2]) -> bool {
         let number = self.order.number(pixel) as usize;
