@@ -1,8 +1,9 @@
 //! Previews: first passes of frames that are held to a time, with rays of every second or fourth pixel in both directions.
 
 use progressive_iso::{
-    BudgetMode, Capture, Frame, FrameOptions, Infill, InfillOptions, PassReport, PixelStatus,
-    ProgressiveIsoRenderer, RendererOptions, Residency, Shading,
+    BlueNoise, BudgetMode, Camera, Capture, Foveation, Frame, FrameOptions, Infill, InfillOptions,
+    InfillSources, Outputs, PassReport, PixelStatus, ProgressiveIsoRenderer, RendererOptions,
+    Residency, Shading,
 };
 use wavefront::cpu::upscale;
 
@@ -153,4 +154,67 @@ fn previews_of_a_resident_volume_show_final_pixels_and_colours_between_them() {
 #[test]
 fn previews_of_a_cached_volume_may_be_crisp() {
     every_setting(Residency::Cached, true);
+}
+
+/// Without the status nothing is written where the volume is not; what is there must not differ.
+#[test]
+fn previews_are_the_same_whatever_pictures_are_asked_for() {
+    let (gpu, scene) = (Gpu::new(), scene());
+    let mut frame = frame(&scene, false);
+    // Far away and beside the middle, so that most of the picture is background.
+    let (center, radius) = scene.compressed().bounding_ball();
+    let aside = [center[0] + 1.1 * radius, center[1] - 0.7 * radius, center[2]];
+    frame.camera = Camera::orbit(aside, 5.0 * radius, 20.0, 25.0, 40.0, 150.0 / 111.0);
+    let mut renderers = [true, false].map(|status| {
+        let (budget, infill) = (Some(BudgetMode::LastFrame), Some(InfillOptions::default()));
+        let outputs = Outputs { depth: true, normal: true, status };
+        let residency = Residency::Full;
+        gpu.renderer(
+            &scene,
+            RendererOptions { budget, infill, outputs, residency, ..options(SIZE) },
+        )
+    });
+    let mut steps = Vec::new();
+    for number in 0..20 {
+        let shown = renderers.each_mut().map(|renderer| {
+            renderer.set_frame(&frame).unwrap();
+            let (first, picture) = pass(&gpu, renderer);
+            let (_, later) = pass(&gpu, renderer);
+            (first.step, [picture, later].map(|p| (p.color, p.depth, p.normal)))
+        });
+        assert!(shown[0] == shown[1], "frame {number}: pictures differ");
+        steps.push(shown[0].0);
+    }
+    assert!([1, 2, 4].iter().all(|step| steps.contains(step)), "{steps:?}");
+}
+
+/// What history has of the picture goes with what a preview writes over it.
+#[test]
+fn a_preview_leaves_no_history_in_the_picture() {
+    let (gpu, scene) = (Gpu::new(), scene());
+    let sources = InfillSources { neighbours: false, coarse_field: false, history: true };
+    let options = RendererOptions {
+        infill: Some(InfillOptions { sources, ..Default::default() }),
+        budget: Some(BudgetMode::LastFrame),
+        foveation: Some(BlueNoise::tiles()),
+        residency: Residency::Full,
+        ..options(SIZE)
+    };
+    let held = frame(&scene, false);
+    let plain = FrameOptions { target_ms: None, ..held.options };
+    let gaze = FrameOptions { foveation: Some(Foveation::default()), ..plain };
+    let filled = |frames: &[FrameOptions]| {
+        let mut renderer = gpu.renderer(&scene, options);
+        let reports = frames.iter().map(|options| {
+            renderer.set_frame(&Frame { options: *options, ..held.clone() }).unwrap();
+            pass(&gpu, &mut renderer).0
+        });
+        let reports: Vec<PassReport> = reports.collect();
+        let last = reports.last().unwrap();
+        (reports.iter().map(|report| report.step).collect::<Vec<_>>(), last.filled_pixels)
+    };
+    let (_, followed) = filled(&[plain, gaze]);
+    assert!(followed > 100, "{followed} pixels filled from the frame before");
+    let (steps, filled) = filled(&[plain, held.options, gaze]);
+    assert_eq!((steps, filled), (vec![1, 4, 1], 0));
 }
