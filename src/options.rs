@@ -200,10 +200,12 @@ pub struct FrameOptions {
     /// round in which the ray stops again, up to 64, and is larger from the start where the cache holds the last
     /// frame's blocks. 1 means no look-ahead at all. More need fewer passes and decode more.
     pub look_ahead: u32,
-    /// What unfinished pixels show after every pass; needs [`RendererOptions::infill`]. They stay unfinished in
+    /// What unfinished pixels show after every pass, or, where one was a preview ([`crate::PassReport::step`]), those of that, between
+    /// which others are shown; needs [`RendererOptions::infill`]. They stay unfinished in
     /// status, depth and normals, and passes go on replacing them by exact ones.
     pub infill: Infill,
-    /// Whether filled pixels show either surface or background; else their colour is a mixture of both.
+    /// Whether filled pixels show either surface or background; else their colour is a mixture of both. Pixels between those of a
+    /// preview then show one of these, not a mixture.
     pub crisp_infill: bool,
     /// Whether rays also request everything on their way to where the coarse field is crossed, beside what they need
     /// and look ahead to: fewer rounds for more decoded blocks. The finished picture is the same. Needs

@@ -22,9 +22,10 @@ pub struct PassReport {
     pub rounds: u32,
     /// Pixels, hence rays.
     pub rays: u32,
-    /// Pixels whose rays the frame has had cast so far: all, or those of the sampling mask of a foveated frame.
+    /// Pixels whose rays the frame has had cast so far: all, or those of the sampling mask of a foveated frame; of a preview its
+    /// own.
     pub sampled_rays: u32,
-    /// Pixels from one of the pass's rays to the next in both directions: 1, or 2 or 4 where the first pass of a frame that is
+    /// Pixels from one of the pass's rays to the next in both directions: 1 (0 before any report), or 2 or 4 where the first pass of a frame that is
     /// held to a time is a preview. Its pixels are those of the finished picture. What it does not know of the others, this
     /// report has from it: `entered_rays` is an estimate, `active_rays` is what is not finished of that, at least 1, and
     /// `open_depth_voxels` is the volume's diagonal.
@@ -52,7 +53,8 @@ pub struct PassReport {
     /// have started) and is 0 when the frame is complete. Computed in f32 from the numbers that the rays
     /// themselves use; of finished pixels it says nothing, since they do not change any more.
     pub open_depth_voxels: f32,
-    /// Unfinished pixels that show a guess: see [`crate::Infill`].
+    /// Unfinished pixels that show a guess: see [`crate::Infill`]. All of them where a preview was shown in the frame, and, once
+    /// the frame is complete enough, with [`crate::InfillOptions::half_resolution`].
     pub filled_pixels: u32,
     /// Pixels that are final.
     pub(crate) exact: u32,
