@@ -57,7 +57,7 @@ pub struct InfillOptions {
     pub guided: bool,
     /// Whether a scene that has next to nothing to fill has it, too.
     pub when: InfillWhen,
-    /// Whether it works at half the picture's resolution, with a third of the memory and in a fraction of the time where most
+    /// Whether it works at half the picture's resolution, with about half of the memory and in a fraction of the time where most
     /// pixels are to be filled: of 2x2 pixels one that is finished counts for all, and unfinished ones show colours between
     /// those of such pixels. For large pictures, and where few rays are cast at first. Tiny pictures are filled at theirs.
     pub half_resolution: bool,
@@ -253,7 +253,8 @@ pub struct FrameOptions {
     /// are filled after every pass, it is a preview, see [`crate::PassReport::step`]: in-fill works at that resolution, and
     /// pixels between the preview's show colours between its until they are finished. Rays that were not
     /// cast are unfinished, as with `foveation`, so else they are filled as `infill` says. A caller's own `foveation` is left
-    /// alone: such frames are not adapted. Needs [`RendererOptions::budget`].
+    /// alone: such frames are not adapted. Needs [`RendererOptions::budget`]; there are no previews with
+    /// [`RendererOptions::draw_target`], since `draw` leaves pixels without a depth out.
     pub target_ms: Option<f32>,
     /// Completeness that is enough: from then on reports are [`crate::PassReport::stopped`] and pixels are filled,
     /// not before. Passes that are called for all the same go on. `None`: pixels are filled after every pass.

@@ -186,6 +186,11 @@ impl ScenePlan {
         self.budget_bytes
     }
 
+    /// Pixels of the picture for one that in-fill works on in both directions.
+    pub(crate) fn infill_step(&self) -> u32 {
+        self.infill.as_ref().map_or(1, InfillPlan::step)
+    }
+
     /// Blocks that can be resident at a time.
     #[must_use]
     pub fn slots(&self) -> u64 {

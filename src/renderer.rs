@@ -370,7 +370,7 @@ impl ProgressiveIsoRenderer {
         let foveated = state.is_some_and(|state| state.sampling.is_some());
         let choice = state.and_then(|state| state.choice);
         let look_ahead = state.map_or(0, |state| state.look_ahead().blocks);
-        let is_reduced = fills && self.plan.infill.as_ref().is_some_and(|infill| infill.step() > 1);
+        let is_reduced = fills && step == 1 && self.plan.infill_step() > 1;
         let [width, height] = self.options.size;
         let cpu_ms = begin.elapsed().as_secs_f64() * 1e3;
         let pixels = width * height;

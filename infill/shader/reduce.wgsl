@@ -7,13 +7,12 @@
 @group(0) @binding(1) var<storage, read> rays: array<u32>; // of the picture
 @group(0) @binding(2) var<storage, read> active_args: array<u32>; // from word 4 on
 @group(0) @binding(3) var<storage, read_write> reduced: array<u32>;
-@group(0) @binding(4) var<storage, read_write> args: array<u32>; // from word 4 on
-@group(0) @binding(5) var color: texture_2d<f32>;
-@group(0) @binding(6) var depth: texture_2d<f32>;
-@group(0) @binding(7) var normals: texture_2d<f32>;
-@group(0) @binding(8) var color_out: texture_storage_2d<rgba8unorm, write>;
-@group(0) @binding(9) var depth_out: texture_storage_2d<r32float, write>;
-@group(0) @binding(10) var normal_out: texture_storage_2d<rgba16float, write>;
+@group(0) @binding(4) var color: texture_2d<f32>;
+@group(0) @binding(5) var depth: texture_2d<f32>;
+@group(0) @binding(6) var normals: texture_2d<f32>;
+@group(0) @binding(7) var color_out: texture_storage_2d<rgba8unorm, write>;
+@group(0) @binding(8) var depth_out: texture_storage_2d<r32float, write>;
+@group(0) @binding(9) var normal_out: texture_storage_2d<rgba16float, write>;
 
 const LANES: u32 = 64u;
 
@@ -42,7 +41,7 @@ fn reduce(number: u32, place: vec2<u32>) -> bool {
         copy_pixel(2u * place + frame_place(firstTrailingBit(finished)), place);
         return false;
     }
-    reduced[RAYS_HEADER + number] = rays[RAYS_HEADER + first + firstTrailingBit(active_bits)];
+    reduced[RAYS_HEADER + number] = rays[RAYS_HEADER + first];
     return true;
 }
 
@@ -50,10 +49,6 @@ fn write_header() {
     for (var i = 0u; i < RAYS_HEADER; i++) {
         reduced[i] = rays[i];
     }
-    let words = indirect_fold(indirect_div_ceil(frame.ray_numbers / 32u, 256u));
-    args[4] = select(0u, words.x, active_args[4] > 0u);
-    args[5] = words.y;
-    args[6] = words.z;
 }
 
 @compute @workgroup_size(LANES)

@@ -119,16 +119,17 @@ fn next(bindings: &[Binding]) -> Constant {
     Constant::U32(bindings.len() as u32)
 }
 
-pub(crate) fn scatter() -> KernelSource {
+pub(crate) fn scatter(halved: bool) -> KernelSource {
     let scatter = Binding::Uniform { bytes: size_of::<ScatterParams>() as u64 };
     let bindings = vec![FRAME, FRAME, SHADING, PARAMS, scatter, READ, READ_WRITE, TEXTURE, TEXTURE];
-    source("infill.scatter", SCATTER, bindings, &[])
+    let halved = ("HALVED", Constant::Bool(halved));
+    source("infill.scatter", SCATTER, bindings, &[halved])
 }
 
 /// What makes the reduced picture, and what shows it.
 pub(crate) fn reduction() -> [KernelSource; 2] {
     let picture = |format| Binding::TextureWrite { format };
-    let mut reduce = vec![FRAME, READ, READ, READ_WRITE, READ_WRITE, TEXTURE, TEXTURE, TEXTURE];
+    let mut reduce = vec![FRAME, READ, READ, READ_WRITE, TEXTURE, TEXTURE, TEXTURE];
     reduce.push(COLOR);
     reduce.push(picture(wgpu::TextureFormat::R32Float));
     reduce.push(picture(wgpu::TextureFormat::Rgba16Float));

@@ -17,7 +17,7 @@ macro_rules! members {
 
 #[test]
 fn uniforms_have_the_declared_layout() {
-    let text = kernels::scatter().wgsl.source;
+    let text = kernels::scatter(false).wgsl.source;
     let params = members!(InfillParams {
         size,
         tiles,

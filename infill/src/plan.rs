@@ -123,8 +123,8 @@ impl InfillPlan {
     /// Bytes of a reduced picture; 0 unless halved.
     fn reduced_bytes(&self) -> u64 {
         let textures = self.pixels() * reduced::OUTPUTS.bytes_per_pixel();
-        let beside = FrameParams::BYTES + reduced::ARGS_BYTES;
-        if self.step > 1 { self.reduced_ray_bytes() + textures + beside } else { 0 }
+        let all = self.reduced_ray_bytes() + textures + FrameParams::BYTES;
+        if self.step > 1 { all } else { 0 }
     }
 
     /// The sources that are in.

@@ -13,9 +13,6 @@ use crate::plan::InfillPlan;
 /// Invocations of a workgroup of both kernels, one for a pixel of the reduced picture.
 const PIXELS_PER_GROUP: u64 = 64;
 
-/// Bytes of the arguments of dispatches over the rays' active bits, where [`RayBuffers::active_args`] has them.
-pub(crate) const ARGS_BYTES: u64 = 32;
-
 /// The pictures that in-fill reads.
 pub(crate) const OUTPUTS: Outputs = Outputs { depth: true, normal: true, status: false };
 
@@ -31,7 +28,6 @@ pub(crate) struct ReduceKernels {
 pub(crate) struct Reduced {
     pub(crate) rays: Buffer,
     pub(crate) frame: Buffer,
-    pub(crate) args: Buffer,
     pub(crate) textures: OutputTextures,
     groups: u64,
     reduce: wgpu::BindGroup,
@@ -92,7 +88,6 @@ impl Reduced {
         };
         let usage = Usage::STORAGE | Usage::COPY_SRC;
         let own = buffer(Category::Scratch, "infill.reduced", plan.reduced_ray_bytes(), usage);
-        let args = buffer(Category::Scratch, "infill.reduced.args", ARGS_BYTES, Usage::STORAGE);
         let usage = Usage::UNIFORM | Usage::COPY_DST;
         let frame = buffer(Category::Params, "infill.reduced.frame", FrameParams::BYTES, usage);
         let textures = OutputTextures::new(device, ledger, OUTPUTS, plan.size());
@@ -106,13 +101,13 @@ impl Reduced {
             else {
                 return Err(Error::MissingOutputs);
             };
-            let buffers = [&*frame, rays.rays(), rays.active_args(), &*own, &*args];
+            let buffers = [&*frame, rays.rays(), rays.active_args(), &*own];
             let from = [pictures.color_view(), depth, normal];
             let views = [from, [textures.color_view(), depth_out, normal_out]].concat();
             kernels.reduce.bind(device, "infill.reduce", &resources(&buffers, &views))
         };
         let groups = plan.reduced_numbers().div_ceil(PIXELS_PER_GROUP);
-        Ok(Self { rays: own, frame, args, textures, groups, reduce })
+        Ok(Self { rays: own, frame, textures, groups, reduce })
     }
 }
 

@@ -115,7 +115,7 @@ impl Infill {
         let sources = plan.sources();
         let make = |source: KernelSource| source.kernel(device);
         Self {
-            scatter: sources.history.then(|| make(kernels::scatter())),
+            scatter: sources.history.then(|| make(kernels::scatter(plan.step() > 1))),
             gate: make(kernels::gate()),
             mark: make(kernels::mark()),
             tiles: make(kernels::tiles()),
@@ -141,7 +141,7 @@ impl Infill {
         let sources = plan.sources();
         let mut all =
             vec![kernels::gate(), kernels::mark(), kernels::tiles(), kernels::tile_args()];
-        all.extend(sources.history.then(kernels::scatter));
+        all.extend(sources.history.then(|| kernels::scatter(plan.step() > 1)));
         all.extend(plan.averages().then(|| kernels::push(plan)));
         all.extend(sources.neighbours.then(|| kernels::pull(plan)));
         all.extend(sources.coarse_field.then(|| kernels::calibrate(plan)));
@@ -275,21 +275,10 @@ impl InfillBuffers {
         };
         let Scene { rays, .. } = scene;
         let work = match &reduced {
-            Some(Reduced { rays: own, frame, args, textures, .. }) => {
-                let numbers = plan.reduced_numbers();
-                Work { frame, shading: rays.shading(), rays: own, args, textures, numbers }
-            }
-            None => Work {
-                frame: rays.frame(),
-                shading: rays.shading(),
-                rays: rays.rays(),
-                args: rays.active_args(),
-                textures: scene.textures,
-                numbers: rays.plan().numbers(),
-            },
+            Some(Reduced { rays: own, frame, textures, .. }) => Work { frame, rays: own, textures },
+            None => Work { frame: rays.frame(), rays: rays.rays(), textures: scene.textures },
         };
-        let mut buffers =
-            Maker { device, ledger, stage, plan, ranges: scene.ranges, work }.make(weights)?;
+        let mut buffers = Maker { device, ledger, stage, plan, scene, work }.make(weights)?;
         buffers.reduced = match (reduced, &stage.reduction) {
             (Some(reduced), Some(kernels)) => {
                 let own = [&*buffers.params, &*buffers.gate_args];
@@ -329,7 +318,7 @@ struct Maker<'a> {
     ledger: &'a Ledger,
     stage: &'a Infill,
     plan: &'a InfillPlan,
-    ranges: &'a RangeBuffers,
+    scene: Scene<'a>,
     work: Work<'a>,
 }
 
@@ -337,12 +326,8 @@ struct Maker<'a> {
 #[derive(Clone, Copy)]
 struct Work<'a> {
     frame: &'a wgpu::Buffer,
-    shading: &'a wgpu::Buffer,
     rays: &'a wgpu::Buffer,
-    args: &'a wgpu::Buffer,
     textures: &'a OutputTextures,
-    /// Of the rays.
-    numbers: u64,
 }
 
 /// Memory of the network.
@@ -378,8 +363,7 @@ impl Maker<'_> {
         self.buffer(Category::Params, label, size, Usage::UNIFORM | Usage::COPY_DST)
     }
 
-    fn views(&self) -> Result<[wgpu::BindingResource<'_>; 2], Error> {
-        let textures = self.work.textures;
+    fn views(textures: &OutputTextures) -> Result<[wgpu::BindingResource<'_>; 2], Error> {
         let (depth, normal) = (textures.depth_view(), textures.normal_view());
         let (Some(depth), Some(normal)) = (depth, normal) else {
             return Err(Error::MissingOutputs);
@@ -389,9 +373,9 @@ impl Maker<'_> {
 
     fn make(&self, weights: Option<&Weights>) -> Result<InfillBuffers, Error> {
         let plan = self.plan;
-        let (Work { frame, shading, rays, args: active_args, textures, .. }, ranges) =
-            (self.work, self.ranges);
-        let [depth, normals] = self.views()?;
+        let (Work { frame, rays, textures }, ranges) = (self.work, self.scene.ranges);
+        let (shading, active_args) = (self.scene.rays.shading(), self.scene.rays.active_args());
+        let [depth, normals] = Self::views(self.work.textures)?;
         let tiles = self.storage("infill.tiles", plan.tile_bytes());
         let args_usage = wgpu::BufferUsages::STORAGE
             | wgpu::BufferUsages::INDIRECT
@@ -402,7 +386,7 @@ impl Maker<'_> {
         let averages = self.storage("infill.averages", plan.average_bytes());
         let pulled = self.storage("infill.pulled", plan.pulled_bytes());
         let guesses = self.storage("infill.guesses", plan.guess_bytes());
-        let history = self.history(&params, [depth.clone(), normals.clone()]);
+        let history = self.history(&params);
         let bind = |kernel: &Kernel, label: &str, resources: &[wgpu::BindingResource<'_>]| {
             kernel.bind(self.device, label, resources)
         };
@@ -482,30 +466,28 @@ impl Maker<'_> {
         Ok(InfillBuffers { _scratch: scratch, ..binds })
     }
 
-    fn history(
-        &self,
-        params: &Buffer,
-        [depth, normals]: [wgpu::BindingResource<'_>; 2],
-    ) -> Option<History> {
+    fn history(&self, params: &Buffer) -> Option<History> {
         let kernel = self.stage.scatter.as_ref()?;
-        let Work { frame: old_frame, shading, rays, .. } = self.work;
+        // The picture's, which show one frame alone.
+        let Scene { rays, textures, .. } = self.scene;
+        let [depth, normals] = Self::views(textures).ok()?;
         let keys = self.storage("infill.history", self.plan.history_bytes());
         let frame = self.uniform("infill.history.frame", FrameParams::BYTES);
         let bytes = size_of::<ScatterParams>() as u64;
         let scatter_params = self.uniform("infill.history.scatter", bytes);
         let resources = [
-            old_frame.as_entire_binding(),
+            rays.frame().as_entire_binding(),
             frame.as_entire_binding(),
-            shading.as_entire_binding(),
+            rays.shading().as_entire_binding(),
             params.as_entire_binding(),
             scatter_params.as_entire_binding(),
-            rays.as_entire_binding(),
+            rays.rays().as_entire_binding(),
             keys.as_entire_binding(),
             depth,
             normals,
         ];
         let scatter = kernel.bind(self.device, "infill.scatter", &resources);
-        let groups = self.work.numbers.div_ceil(RAYS_PER_GROUP);
+        let groups = rays.plan().numbers().div_ceil(RAYS_PER_GROUP);
         Some(History { keys, frame, scatter_params, scatter, groups })
     }
 

@@ -36,6 +36,7 @@ fn kernels_validate_with_every_set_of_sources() {
                 let plan = plan.unwrap();
                 assert_eq!(plan.sources(), sources);
                 Infill::sources(&plan).iter().for_each(check);
+                Infill::sources(&plan.halved().unwrap()).iter().for_each(check);
                 Guide::source(&plan).iter().for_each(check);
             }
         }

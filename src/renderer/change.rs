@@ -39,6 +39,7 @@ impl ProgressiveIsoRenderer {
         let (layout, strategy) = (plan.samples.layout(), plan.strategy);
         if pictures
             || plan.infill_options != self.plan.infill_options
+            || plan.infill_step() != self.plan.infill_step()
             || options.blue_noise() != self.options.blue_noise()
             || plan.previews.is_empty() != self.plan.previews.is_empty()
             || (layout, strategy) != (self.plan.samples.layout(), self.plan.strategy)

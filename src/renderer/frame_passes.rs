@@ -199,8 +199,8 @@ impl Pass<'_> {
             from_completeness: options.stop_at.map_or(0.0, |stop| stop.0),
             crisp: options.crisp_infill,
         };
-        let view = match &self.plan.infill {
-            Some(infill) if state.step == 1 => state.view.reduced(infill.step()),
+        let view = match state.step {
+            1 => state.view.reduced(self.plan.infill_step()),
             _ => state.ray_view(),
         };
         let next = (&view, &state.params_of(&view, self.plan));

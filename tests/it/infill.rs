@@ -102,8 +102,9 @@ impl View {
     /// Keys of the hits of an older picture.
     pub(crate) fn history(&self, old: &View, known: &[Option<Finished>]) -> Vec<u32> {
         let rows = self.view.pixel_from_index();
-        let mut keys = vec![EMPTY; known.len()];
-        for (pixel, finished) in self.pixels().zip(known) {
+        let [width, height] = self.params.size();
+        let mut keys = vec![EMPTY; (width * height) as usize];
+        for (pixel, finished) in old.pixels().zip(known) {
             let &Some(Finished::Hit { depth, normal }) = finished else { continue };
             let ray = FrameRay::new(&old.params, pixel);
             let t = ray.t(&old.params, depth);

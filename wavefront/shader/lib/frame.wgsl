@@ -26,7 +26,7 @@ struct FrameParams {
     shift_z: u32,
     shift_misses: u32,
     most_cells: u32, // RunAhead: cells that one walk of all listed rays visits
-    middle: vec2<f32>,  // of the whole picture, in its pixels
+    middle: vec2<f32>,  // of the whole picture, in its pixels, less what the rays are moved from their middles
     step: f32,          // of its pixels from one ray to the next
     preview_level: u32, // log2 of the step of a preview that the frame goes on from, 0 for none
     volume_low: vec2<u32>, // pixels outside of which no ray meets the volume: the first ones
