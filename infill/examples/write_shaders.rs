@@ -9,8 +9,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let limits = wgpu::Limits::default();
     let ranges = MacrocellPlan::new([48, 16, 16], &limits)?;
     let plan = InfillPlan::new([40, 30], Sources::default(), true, &ranges, &limits)?;
-    for source in Infill::sources(&plan).into_iter().chain(Guide::source(&plan)) {
-        std::fs::write(folder.join(format!("{}.wgsl", source.label)), source.wgsl.source)?;
+    let mut sources: Vec<_> =
+        Guide::source(&plan).map(|source| ("full", source)).into_iter().collect();
+    sources.extend(Infill::sources(&plan).into_iter().map(|source| ("full", source)));
+    let halved = plan.halved().ok_or("a picture that is too small")?;
+    sources.extend(Infill::sources(&halved).into_iter().map(|source| ("half", source)));
+    for (name, source) in sources {
+        let file = format!("{}.{name}.wgsl", source.label);
+        std::fs::write(folder.join(file), source.wgsl.source)?;
     }
     Ok(())
 }
