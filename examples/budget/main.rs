@@ -55,6 +55,10 @@ struct Arguments {
     /// Leaves the pixels without a ray as they are.
     #[arg(long)]
     no_infill: bool,
+    /// Shows every recording so often, by renderers of their own each time: a frame's time is the median of its times, so that
+    /// what other processes take from one of them does not count.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    runs: u32,
     /// Only volumes whose name contains this.
     #[arg(long)]
     volume: Option<String>,
@@ -127,7 +131,8 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         let show = Show { volume: &volume, isovalue, size, infill };
         for &seconds in arguments.set.seconds() {
             let views = sequence::record(seconds, SEED);
-            let (shown, target_ms) = measure::run(adapter, &show, &views, target_ms)?;
+            let (shown, target_ms) =
+                measure::run_often(adapter, &show, &views, target_ms, arguments.runs)?;
             let name = format!("{}-{seconds}s", subject.name());
             let chart = chart(&name, &shown, target_ms);
             let path = arguments.out.join(format!("budget-{name}.svg"));

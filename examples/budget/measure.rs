@@ -190,6 +190,45 @@ pub fn run(
     Ok((shown, target_ms))
 }
 
+/// Shows a recording `runs` times; of every mode's frames the medians, and the target.
+pub fn run_often(
+    adapter: Option<&str>,
+    scene: &Show<'_>,
+    views: &[View],
+    target_ms: Option<f64>,
+    runs: u32,
+) -> Result<(Vec<Vec<Shown>>, f64), Failure> {
+    let (first, target_ms) = run(adapter, scene, views, target_ms)?;
+    let mut all = vec![first];
+    for _ in 1..runs {
+        all.push(run(adapter, scene, views, Some(target_ms))?.0);
+    }
+    let of = |mode: usize, frame: usize| {
+        Shown::median(&all.iter().map(|run| run[mode][frame]).collect::<Vec<_>>())
+    };
+    let mode = |mode: usize| (0..views.len()).map(|frame| of(mode, frame)).collect();
+    Ok(((0..MODES.len()).map(mode).collect(), target_ms))
+}
+
+impl Shown {
+    /// Of the same frame in several runs; as it is if there is one.
+    fn median(runs: &[Self]) -> Self {
+        let of = |value: fn(&Self) -> f64| median(runs.iter().map(value));
+        let ms = of(|shown| shown.ms);
+        let ratios = || runs.iter().filter_map(|shown| Some(shown.predicted_ms? / shown.ms));
+        let errors = || runs.iter().filter_map(|shown| shown.error);
+        Self {
+            ms,
+            quality: of(|shown| shown.quality),
+            step: runs[0].step,
+            error: (errors().count() > 0).then(|| median(errors())),
+            // As far from the time as predictions are in the median.
+            predicted_ms: (ratios().count() > 0).then(|| ms * median(ratios())),
+            budget_ms: of(|shown| shown.budget_ms),
+        }
+    }
+}
+
 /// Compares what is shown with the finished picture, which the first mode shows.
 fn compare(
     renderers: &[(Gpu, ProgressiveIsoRenderer)],
