@@ -20,7 +20,7 @@ use krls::Krls;
 use outlook::{FEATURES, Outlook};
 use work::PrePass;
 
-pub(crate) use setting::{Sampling, Setting};
+pub(crate) use setting::{STEPS, Sampling, Setting, step_index};
 
 use crate::wgpu;
 

@@ -2,13 +2,13 @@
 
 use wavefront::FrameParams;
 
-use crate::budget::Setting;
+use crate::budget::{STEPS, Setting, step_index};
 
 /// Rounds of a pass by measured time.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Schedule {
     /// By the logarithms of a setting's first and last step.
-    rounds: [[Rounds; 3]; 3],
+    rounds: [[Rounds; STEPS]; STEPS],
     /// Cells that a walk may visit; `None` before anything was measured.
     most_cells: Option<u32>,
 }
@@ -84,7 +84,7 @@ impl Schedule {
 }
 
 fn places(setting: Setting) -> [usize; 2] {
-    [setting.first, setting.last].map(|step| (step.max(1).ilog2() as usize).min(2))
+    [setting.first, setting.last].map(step_index)
 }
 
 #[cfg(test)]

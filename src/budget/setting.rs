@@ -82,6 +82,14 @@ impl Sampling {
     }
 }
 
+/// Steps that there may be: 1, 2 and 4.
+pub(crate) const STEPS: usize = 3;
+
+/// The place of a step among them.
+pub(crate) fn step_index(step: u32) -> usize {
+    (step.max(1).ilog2() as usize).min(STEPS - 1)
+}
+
 /// Pixels for one ray of a step.
 pub(super) fn squared(step: u32) -> f64 {
     f64::from(step * step)

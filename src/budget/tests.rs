@@ -24,6 +24,11 @@ fn view(azimuth: f64, distance: f64) -> FrameView {
     FrameView::new(&camera, SIZE, world, GRID).unwrap_or_else(|e| panic!("{e}"))
 }
 
+/// Without previews or pixels that are filled.
+fn request(view: &FrameView, target_ms: f64) -> Request<'_> {
+    Request { view, size: SIZE, steps: &[1], isovalue: 0.5, look_ahead: 2, fills: false, target_ms }
+}
+
 /// Shows `frames` frames of a moving camera to a renderer whose times are `cost` of density and
 /// frame number, and returns densities and times.
 fn show(
@@ -36,15 +41,7 @@ fn show(
     let frame = |number: u32| {
         let distance = 0.8 + 0.3 * (f64::from(number) * 0.1).sin();
         let view = view(3.0 * f64::from(number), distance);
-        let request = Request {
-            view: &view,
-            size: SIZE,
-            steps: &[1],
-            isovalue: 0.5,
-            look_ahead: 2,
-            fills,
-            target_ms,
-        };
+        let request = Request { fills, ..request(&view, target_ms) };
         let choice = budget.choose(&request);
         let ms = cost(choice.asked, number);
         budget.learn(&choice, ms);
@@ -69,15 +66,7 @@ fn a_frame_that_decodes_too_much_does_not_look_ahead() {
     // Decoding what is new takes a millisecond for every step of looking ahead; the rest nothing of note.
     let mut look = |azimuth: f64, target_ms: f64| {
         let view = view(azimuth, 1.0);
-        let request = Request {
-            view: &view,
-            size: SIZE,
-            steps: &[1],
-            isovalue: 0.5,
-            look_ahead: 4,
-            fills: false,
-            target_ms,
-        };
+        let request = Request { look_ahead: 4, ..request(&view, target_ms) };
         let choice = budget.choose(&request);
         budget.learn(&choice, 10.0 + f64::from(choice.look_ahead));
         choice.look_ahead
@@ -189,15 +178,7 @@ proptest! {
 fn a_second_pass_casts_what_the_first_one_leaves_time_for() {
     let mut budget = budget(BudgetMode::TwoPass);
     let view = view(0.0, 1.0);
-    let request = Request {
-        view: &view,
-        size: SIZE,
-        steps: &[1],
-        isovalue: 0.5,
-        look_ahead: 2,
-        fills: false,
-        target_ms: 20.0,
-    };
+    let request = request(&view, 20.0);
     let choice = budget.choose(&request);
     let first = choice.setting.first_sampling();
     assert_eq!(budget.second(&choice), first, "nothing is known of it yet");
@@ -213,15 +194,7 @@ fn what_was_slow_once_is_tried_again() {
         let mut budget = budget(BudgetMode::Predicted);
         let (view, mut seen, mut settings) = (view(0.0, 1.0), 0, Vec::new());
         for _ in 0..120 {
-            let request = Request {
-                view: &view,
-                size: SIZE,
-                steps: &[1, 2, 4],
-                isovalue: 0.5,
-                look_ahead: 2,
-                fills: true,
-                target_ms: 60.0,
-            };
+            let request = Request { steps: &[1, 2, 4], fills: true, ..request(&view, 60.0) };
             let choice = budget.choose(&request);
             let Setting { first, last, share } = choice.setting;
             let fixed = |step: u32| 30.0 / f64::from(step * step);

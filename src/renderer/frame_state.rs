@@ -2,16 +2,16 @@
 
 use wavefront::{FrameParams, FrameView, LookAhead, SamplingParams};
 
-use crate::budget::{Choice, Sampling};
+use crate::budget::{Choice, STEPS, Sampling, step_index};
 use crate::{Frame, ScenePlan};
 
 /// Isovalues of the hits that the rays of each step have found last, as long as their pictures show those.
 #[derive(Debug, Default)]
-pub(super) struct ShownHits([Option<f32>; 3]);
+pub(super) struct ShownHits([Option<f32>; STEPS]);
 
 impl ShownHits {
     fn at(&mut self, step: u32) -> &mut Option<f32> {
-        &mut self.0[(step.max(1).ilog2() as usize).min(2)]
+        &mut self.0[step_index(step)]
     }
 
     /// The pictures begin to show those of another isovalue; that of those before.

@@ -29,16 +29,6 @@ const FIRST_PAGE: u32 = 4u;
 #ifdef LRU_PAGES_4
 @group(0) @binding(FIRST_PAGE + 3u) var<storage, read> lru_slots_3: array<f32>;
 #endif
-@group(0) @binding(COLOR_BINDING) var color_out: texture_storage_2d<rgba8unorm, write>;
-#ifdef OUTPUT_DEPTH
-@group(0) @binding(DEPTH_BINDING) var depth_out: texture_storage_2d<r32float, write>;
-#endif
-#ifdef OUTPUT_NORMAL
-@group(0) @binding(NORMAL_BINDING) var normal_out: texture_storage_2d<rgba16float, write>;
-#endif
-#ifdef OUTPUT_STATUS
-@group(0) @binding(STATUS_BINDING) var status_out: texture_storage_2d<r32uint, write>;
-#endif
 
 var<workgroup> hit_count: atomic<u32>;
 // Bits of a float that is not negative: they are ordered as the floats are.

@@ -14,16 +14,6 @@
 #ifdef RESUME
 @group(0) @binding(4) var<storage, read> preview: array<u32>; // the preview's rays
 #endif
-@group(0) @binding(COLOR_BINDING) var color_out: texture_storage_2d<rgba8unorm, write>;
-#ifdef OUTPUT_DEPTH
-@group(0) @binding(DEPTH_BINDING) var depth_out: texture_storage_2d<r32float, write>;
-#endif
-#ifdef OUTPUT_NORMAL
-@group(0) @binding(NORMAL_BINDING) var normal_out: texture_storage_2d<rgba16float, write>;
-#endif
-#ifdef OUTPUT_STATUS
-@group(0) @binding(STATUS_BINDING) var status_out: texture_storage_2d<r32uint, write>;
-#endif
 
 // A tile of pixels: those of eight words that follow each other, unless the picture is tiny.
 const TILE: u32 = 16u;

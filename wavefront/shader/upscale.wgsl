@@ -2,6 +2,7 @@
 // between theirs. The pictures are unfinished everywhere, with the background's colour. One invocation for a ray of the preview.
 #import frame
 #import indirect
+#import output_textures
 #import shading
 
 struct UpscaleParams {
@@ -22,16 +23,6 @@ struct UpscaleParams {
 #endif
 #ifdef OUTPUT_STATUS
 @group(0) @binding(PREVIEW_STATUS_BINDING) var statuses: texture_2d<u32>;
-#endif
-@group(0) @binding(COLOR_BINDING) var color_out: texture_storage_2d<rgba8unorm, write>;
-#ifdef OUTPUT_DEPTH
-@group(0) @binding(DEPTH_BINDING) var depth_out: texture_storage_2d<r32float, write>;
-#endif
-#ifdef OUTPUT_NORMAL
-@group(0) @binding(NORMAL_BINDING) var normal_out: texture_storage_2d<rgba16float, write>;
-#endif
-#ifdef OUTPUT_STATUS
-@group(0) @binding(STATUS_BINDING) var status_out: texture_storage_2d<r32uint, write>;
 #endif
 
 // What the preview's own pixel has beside its colour.

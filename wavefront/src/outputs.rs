@@ -7,6 +7,8 @@ use gpu_primitives::memory::{Category, Ledger, Texture};
 use gpu_primitives::wgpu;
 use gpu_primitives::wgsl::{Constant, Module};
 
+pub(crate) const OUTPUT_TEXTURES: Module =
+    Module { name: "output_textures", source: include_str!("../shader/lib/output_textures.wgsl") };
 pub(crate) const OUTPUTS: Module =
     Module { name: "outputs", source: include_str!("../shader/lib/outputs.wgsl") };
 pub(crate) const SHADING: Module =

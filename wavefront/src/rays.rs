@@ -11,7 +11,7 @@ use gpu_primitives::{indirect, wgpu};
 
 use crate::foveation::{SamplingParams, mask_source};
 use crate::frame::{FrameParams, PARAMS_BYTES};
-use crate::outputs::{OUTPUTS, OutputTextures, Outputs, SHADING, ShadingParams};
+use crate::outputs::{OUTPUT_TEXTURES, OUTPUTS, OutputTextures, Outputs, SHADING, ShadingParams};
 use crate::plan::{
     ARGS_BYTES, FILL_ARGS_BYTES, MASKED_LIST_ARGS_BYTES, RAYS_HEADER_WORDS, WavefrontPlan,
 };
@@ -122,6 +122,7 @@ pub(crate) fn library(samples: SampleLayout) -> Vec<Module> {
         RAY_WORDS,
         WORK,
         samples.module(),
+        OUTPUT_TEXTURES,
         OUTPUTS,
         SHADING,
         indirect::MODULE,

@@ -1,4 +1,5 @@
-// Writing the pictures. The importing text declares the textures and what `shading` needs.
+// Writing the pictures. The importing text declares what `shading` needs.
+#import output_textures
 #import shading
 
 const STATUS_BACKGROUND: u32 = 0u;
