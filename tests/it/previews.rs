@@ -1,10 +1,12 @@
 //! Previews: first passes of frames that are held to a time, with rays of every second or fourth pixel in both directions.
 
+use gpu_testkit::gpu as kit;
 use progressive_iso::{
     BlueNoise, BudgetMode, Camera, Capture, Foveation, Frame, FrameOptions, Infill, InfillOptions,
     InfillSources, Outputs, PassReport, PixelStatus, ProgressiveIsoRenderer, RendererOptions,
     Residency, Shading,
 };
+use wavefront::RayOrder;
 use wavefront::cpu::upscale;
 
 use crate::support::{Gpu, Scene, options};
@@ -85,6 +87,18 @@ fn finished_pixels(capture: &Capture) -> impl Iterator<Item = usize> {
     (0..statuses(capture).len()).filter(finished)
 }
 
+/// Pixels of a preview whose rays the picture's sampling mask does not have: those that it has not finished wait.
+fn missing_in_mask(gpu: &Gpu, renderer: &ProgressiveIsoRenderer, step: u32) -> usize {
+    let mask = renderer.rays().unwrap().sampling_mask().unwrap();
+    let words = kit::read_u32s(&gpu.device, &gpu.queue, mask);
+    let order = RayOrder::new(SIZE);
+    let numbers = (0..SIZE[0] * SIZE[1])
+        .map(|i| [i % SIZE[0], i / SIZE[0]])
+        .filter(|pixel| pixel.iter().all(|p| p % step == 0))
+        .map(|pixel| order.number(pixel));
+    numbers.filter(|n| words[*n as usize / 32] >> (n % 32) & 1 == 0).count()
+}
+
 fn check_report(report: &PassReport, shown: &Capture) {
     assert_eq!(report.exact_pixels() as usize, finished_pixels(shown).count(), "{report:?}");
     let is_preview = report.step > 1;
@@ -125,6 +139,9 @@ fn every_setting(residency: Residency, crisp: bool) {
         let (second, later) = pass(&gpu, &mut renderer);
         assert_eq!((second.pass, second.step), (2, 1), "{second:?}");
         check_report(&second, &later);
+        if first.step > 1 {
+            assert_eq!(missing_in_mask(&gpu, &renderer, first.step), 0, "frame {number}");
+        }
         assert!(finished_pixels(&later).all(|i| is_final(&later, &expected, i)), "{number}");
         assert!(second.exact_pixels() > first.exact_pixels(), "frame {number}");
         for i in 0..statuses(&later).len() {
