@@ -5,6 +5,7 @@
 //! while frames are rendered (V. Bruder, S. Frey, T. Ertl, Real-Time Performance Prediction and Tuning for Interactive
 //! Volume Raycasting, 2016).
 
+mod errors;
 mod krls;
 mod outlook;
 mod setting;
@@ -16,6 +17,7 @@ use macrocell::{Grid, RangeBuffers};
 use wavefront::{Foveation, FrameView};
 use web_time::Instant;
 
+use errors::Errors;
 use krls::Krls;
 use outlook::{FEATURES, Outlook};
 use work::PrePass;
@@ -59,12 +61,8 @@ const CAUTION: f64 = 0.5;
 const ROOM: f64 = 0.85;
 const LEAST_WAIT: u32 = 4;
 const MOST_WAIT: u32 = 64;
-/// Relative error of predictions before any was compared, the most that one counts as, and how much the newest counts.
-const FIRST_SPREAD: f64 = 0.05;
-const MOST_ERROR: f64 = 0.5;
-const SPREAD_RATE: f64 = 0.1;
-/// As many of these are kept free below a target.
-const SPREADS: f64 = 1.5;
+/// As many typical errors of predictions are kept free below a target.
+const SPREADS: f64 = 0.75;
 /// Part of a time that is clearly less.
 const CLEARLY_LESS: f64 = 0.9;
 /// Shares between the most and the least that are looked at.
@@ -139,8 +137,7 @@ pub(crate) struct Budget {
     trial_wait: u32,
     /// First and last steps that a frame with a usable time had.
     steps_seen: Vec<[u32; 2]>,
-    /// Mean size of the newest predictions' relative errors.
-    spread: f64,
+    errors: Errors,
     unusable: u32,
     learning_ms: f64,
 }
@@ -161,7 +158,7 @@ impl Budget {
             trial_in: 0,
             trial_wait: 0,
             steps_seen: Vec::new(),
-            spread: FIRST_SPREAD,
+            errors: Errors::default(),
             unusable: 0,
             learning_ms: 0.0,
         }
@@ -304,15 +301,12 @@ impl Budget {
         let begin = Instant::now();
         self.last = Some(Measured { asked: choice.asked, ms, work: choice.work });
         self.end_frame(choice.is_trial, ms > choice.target_ms);
-        if let Some(predicted_ms) = choice.predicted_ms {
-            let error = (ms / predicted_ms).ln().abs().min(MOST_ERROR);
-            self.spread += SPREAD_RATE * (error - self.spread);
-        }
         if choice.work > 0.0 {
             let cost = (ms / choice.work).ln();
-            // What is new costs about as much as the first frame did.
             let level = *self.level.get_or_insert(cost);
-            self.model.learn(&choice.features, cost - level);
+            let (expected, novelty) = self.model.predict(&choice.features);
+            let error = self.errors.take(cost - level - expected, novelty);
+            self.model.learn(&choice.features, expected + error);
         }
         self.learning_ms = begin.elapsed().as_secs_f64() * 1e3;
     }
@@ -379,17 +373,17 @@ impl Budget {
         mut settings: impl Iterator<Item = (f64, Setting)>,
     ) -> Option<f64> {
         let last = self.last.filter(|last| last.work > 0.0 && last.ms < ROOM * target_ms)?;
-        let spread = (SPREADS * self.spread).exp();
+        let spread = (SPREADS * self.errors.spread()).exp();
         let ms_of = |setting: &Setting| last.ms * outlook.units(setting) / last.work * spread;
         let fits = |(_, setting): &(f64, Setting)| ms_of(setting) <= target_ms;
         let wanted = self.trial_in == 0;
         wanted.then(|| settings.find(fits)).flatten().map(|(asked, _)| asked)
     }
 
-    /// More than most times that are predicted like this: about one in nine of those that scatter as the newest did
-    /// lies above.
+    /// More than most times that are predicted like this: about one in four of those that scatter as the newest did lies
+    /// above.
     fn cautious_ms(&self, outlook: &Outlook, setting: &Setting) -> f64 {
-        let spread = (SPREADS * self.spread).exp();
+        let spread = (SPREADS * self.errors.spread()).exp();
         self.predict(outlook, setting)
             .map_or(f64::INFINITY, |(ms, novelty)| ms * (1.0 + CAUTION * novelty) * spread)
     }

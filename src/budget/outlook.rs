@@ -6,11 +6,12 @@ use super::work::Work;
 
 /// Number of features.
 pub(super) const FEATURES: usize = 10;
-/// Work of starting a ray, of filling a pixel, of making a pixel from a preview and of decoding a coarse cell, in visits of a
-/// block, before anything was learned.
-const START_WORK: f64 = 0.3;
+/// Work of starting a ray, of going on with one from a preview, of filling a pixel, of making a pixel from a preview and of
+/// decoding a coarse cell, in visits of a block, before anything was learned.
+const START_WORK: f64 = 0.27;
+const RESUME_WORK: f64 = 0.4;
 const FILL_WORK: f64 = 2.5;
-const UPSCALE_WORK: f64 = 0.15;
+const UPSCALE_WORK: f64 = 0.19;
 const DECODE_WORK: f64 = 2000.0;
 /// Part of what is decoded that a doubled look-ahead adds, before anything was learned.
 const LOOK_AHEAD_WORK: f64 = 0.25;
@@ -63,7 +64,7 @@ impl Outlook {
         let rays = |step| self.pixels / squared(step);
         let mut work = rays(setting.first) * START_WORK;
         if setting.last < setting.first {
-            work += rays(setting.last) * (START_WORK + UPSCALE_WORK);
+            work += rays(setting.last) * RESUME_WORK;
         }
         if setting.last > 1 {
             work += self.pixels * UPSCALE_WORK;

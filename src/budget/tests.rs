@@ -211,3 +211,31 @@ fn what_was_slow_once_is_tried_again() {
         assert!(kept > 15, "hiccups at {slow}: {:?}", &settings[60..]);
     }
 }
+
+#[test]
+fn what_was_never_tried_costs_as_much_for_its_work_as_what_was() {
+    let (mut budget, mut scatter) = (budget(BudgetMode::Predicted), noise(3));
+    let other = Setting::new(0.3, &[1, 2, 4]);
+    assert_eq!([other.first, other.last], [2, 1]);
+    for i in 0..40 {
+        // At first nothing is in sight, which costs a tenth for its work.
+        let (distance, isovalue, cost) = if i == 0 { (1.6, 5.0, 1e-6) } else { (0.9, 0.5, 1e-5) };
+        let view = view(2.0 * f64::from(i), distance + 0.1 * (f64::from(i) * 0.3).sin());
+        let request = Request { steps: &[1, 2, 4], fills: true, isovalue, ..request(&view, 1e3) };
+        let choice = budget.choose(&request);
+        let work = budget.pre_pass.as_mut().map(|pre| pre.estimate(&view, SIZE, isovalue)).unwrap();
+        let outlook = Outlook::new(&request, &work, false);
+        let of = |setting: &Setting| (outlook.features(setting), outlook.units(setting));
+        if i > 10 {
+            let (ms, _) = budget.predict(&outlook, &other).unwrap();
+            let expected = cost * of(&other).1;
+            let error = (ms / expected).ln();
+            assert!(error.abs() < 0.1, "seed 3, frame {i}: {ms} for {expected} ms");
+        }
+        // Up to whole pictures of every second pixel, in times that scatter by 15 %.
+        let known = Setting::new((0.06 * 1.25_f64.powi(i)).min(0.25), &[1, 2, 4]);
+        let (features, work) = of(&known);
+        let ms = cost * work * (0.3 * (scatter() - 0.5)).exp();
+        budget.learn(&Choice { features, work, setting: known, ..choice }, ms);
+    }
+}

@@ -1,0 +1,81 @@
+//! How far predictions are off, and which of that is to be learned.
+
+/// Typical error before any was seen, and how much the newest counts.
+const FIRST_SPREAD: f64 = 0.05;
+const SPREAD_RATE: f64 = 0.1;
+/// An error counts as at most as many typical ones.
+const MOST_SPREADS: f64 = 3.0;
+/// As many typical errors, with what is expected of something as new, are a surprise.
+const SURPRISE: f64 = 2.0;
+
+/// Errors of predictions, as logarithms of times over predicted ones.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Errors {
+    /// Mean size of the newest ones, but for what stands out.
+    spread: f64,
+    /// The newest one, if it was a surprise.
+    surprise: Option<f64>,
+}
+
+impl Default for Errors {
+    fn default() -> Self {
+        Self { spread: FIRST_SPREAD, surprise: None }
+    }
+}
+
+impl Errors {
+    /// Typical size.
+    pub(super) fn spread(&self) -> f64 {
+        self.spread
+    }
+
+    /// Takes in the error of a prediction that was as new as `novelty`, 0 to 1; returns how much of it is to be learned: of
+    /// a surprise as much as was to be expected, since it may be another process's, unless it is the second one in
+    /// the same direction.
+    pub(super) fn take(&mut self, error: f64, novelty: f64) -> f64 {
+        let expected = SURPRISE * (self.spread + novelty);
+        let counted = (error.abs() - novelty).clamp(0.0, MOST_SPREADS * self.spread);
+        self.spread += SPREAD_RATE * (counted - self.spread);
+        let before = self.surprise.take();
+        if error.abs() <= expected || before.is_some_and(|before| before * error > 0.0) {
+            return error;
+        }
+        self.surprise = Some(error);
+        error.clamp(-expected, expected)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::budget::noise;
+
+    #[test]
+    fn the_spread_is_that_of_most_errors() {
+        let (mut errors, mut random) = (Errors::default(), noise(5));
+        for i in 0..2000 {
+            // Mean size 0.02; every tenth is of another kind.
+            let usual = 0.08 * random() - 0.04;
+            errors.take(if i % 10 == 0 { 2.0 } else { usual }, 0.0);
+            if i > 100 {
+                let spread = errors.spread();
+                assert!((0.014..0.045).contains(&spread), "seed 5, error {i}: {spread}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_surprise_is_learned_when_it_comes_again() {
+        let mut errors = Errors::default();
+        let expected = 2.0 * (FIRST_SPREAD + 0.1);
+        assert!((errors.take(1.0, 0.1) - expected).abs() < 1e-12);
+        assert!((errors.take(0.8, 0.0) - 0.8).abs() < 1e-12);
+        // The other way it is new.
+        let expected = 2.0 * errors.spread();
+        assert!((errors.take(-0.8, 0.0) + expected).abs() < 1e-12);
+        // What was to be expected ends it.
+        let usual = 0.5 * errors.spread();
+        assert!((errors.take(usual, 0.0) - usual).abs() < 1e-12);
+        assert!(errors.take(-0.8, 0.0) > -0.8);
+    }
+}
