@@ -304,7 +304,8 @@ impl Budget {
         if choice.work > 0.0 {
             let cost = (ms / choice.work).ln();
             let level = *self.level.get_or_insert(cost);
-            let (expected, novelty) = self.model.predict(&choice.features);
+            let (known, novelty) = self.model.predict(&choice.features);
+            let expected = known + self.errors.drift();
             let error = self.errors.take(cost - level - expected, novelty);
             self.model.learn(&choice.features, expected + error);
         }
@@ -392,7 +393,8 @@ impl Budget {
     fn predict(&self, outlook: &Outlook, setting: &Setting) -> Option<(f64, f64)> {
         let level = self.level?;
         let (cost, novelty) = self.model.predict(&outlook.features(setting));
-        Some((outlook.units(setting) * (level + cost).exp(), novelty))
+        let cost = level + cost + self.errors.drift();
+        Some((outlook.units(setting) * cost.exp(), novelty))
     }
 }
 

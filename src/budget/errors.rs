@@ -7,6 +7,11 @@ const SPREAD_RATE: f64 = 0.1;
 const MOST_SPREADS: f64 = 3.0;
 /// As many typical errors, with what is expected of something as new, are a surprise.
 const SURPRISE: f64 = 2.0;
+/// How much of the newest error the drift takes in, and how much of it stays from frame to frame, since the model learns, too.
+const DRIFT_RATE: f64 = 0.3;
+const DRIFT_KEPT: f64 = 0.9;
+/// What is newer than this says little about the machine.
+const MOST_NOVELTY: f64 = 0.2;
 
 /// Errors of predictions, as logarithms of times over predicted ones.
 #[derive(Clone, Copy, Debug)]
@@ -15,11 +20,13 @@ pub(super) struct Errors {
     spread: f64,
     /// The newest one, if it was a surprise.
     surprise: Option<f64>,
+    /// What the newest ones have in common.
+    drift: f64,
 }
 
 impl Default for Errors {
     fn default() -> Self {
-        Self { spread: FIRST_SPREAD, surprise: None }
+        Self { spread: FIRST_SPREAD, surprise: None, drift: 0.0 }
     }
 }
 
@@ -29,6 +36,11 @@ impl Errors {
         self.spread
     }
 
+    /// How much slower the machine is than the model knows yet, as a logarithm; to be added to predictions.
+    pub(super) fn drift(&self) -> f64 {
+        self.drift
+    }
+
     /// Takes in the error of a prediction that was as new as `novelty`, 0 to 1; returns how much of it is to be learned: of
     /// a surprise as much as was to be expected, since it may be another process's, unless it is the second one in
     /// the same direction.
@@ -36,6 +48,14 @@ impl Errors {
         let expected = SURPRISE * (self.spread + novelty);
         let counted = (error.abs() - novelty).clamp(0.0, MOST_SPREADS * self.spread);
         self.spread += SPREAD_RATE * (counted - self.spread);
+        let learned = self.learned(error, expected);
+        if novelty < MOST_NOVELTY {
+            self.drift = DRIFT_KEPT * (self.drift + DRIFT_RATE * learned);
+        }
+        learned
+    }
+
+    fn learned(&mut self, error: f64, expected: f64) -> f64 {
         let before = self.surprise.take();
         if error.abs() <= expected || before.is_some_and(|before| before * error > 0.0) {
             return error;
@@ -77,5 +97,26 @@ mod tests {
         let usual = 0.5 * errors.spread();
         assert!((errors.take(usual, 0.0) - usual).abs() < 1e-12);
         assert!(errors.take(-0.8, 0.0) > -0.8);
+    }
+
+    #[test]
+    fn errors_in_one_direction_are_a_drift() {
+        let mut errors = Errors::default();
+        // The machine is slower by 0.2 from now on, and the model does not learn it.
+        for _ in 0..12 {
+            let error = 0.2 - errors.drift();
+            errors.take(error, 0.0);
+        }
+        assert!((0.1..0.2).contains(&errors.drift()), "{}", errors.drift());
+        // What is new says nothing about it.
+        let before = errors.drift();
+        errors.take(2.0, 0.9);
+        assert_eq!(errors.drift().to_bits(), before.to_bits());
+        // Once it has learned it, nothing is left.
+        for _ in 0..30 {
+            let error = -errors.drift();
+            errors.take(error, 0.0);
+        }
+        assert!(errors.drift().abs() < 1e-3, "{}", errors.drift());
     }
 }
