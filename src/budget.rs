@@ -62,7 +62,7 @@ const ROOM: f64 = 0.85;
 const LEAST_WAIT: u32 = 4;
 const MOST_WAIT: u32 = 64;
 /// As many typical errors of predictions are kept free below a target.
-const SPREADS: f64 = 0.75;
+const SPREADS: f64 = 1.0;
 /// Part of a time that is clearly less.
 const CLEARLY_LESS: f64 = 0.9;
 /// Shares between the most and the least that are looked at.
@@ -301,8 +301,8 @@ impl Budget {
         let begin = Instant::now();
         self.last = Some(Measured { asked: choice.asked, ms, work: choice.work });
         self.end_frame(choice.is_trial, ms > choice.target_ms);
-        if choice.work > 0.0 {
-            let cost = (ms / choice.work).ln();
+        let cost = (ms / choice.work).ln();
+        if cost.is_finite() {
             let level = *self.level.get_or_insert(cost);
             let (known, novelty) = self.model.predict(&choice.features);
             let expected = known + self.errors.drift();
@@ -381,7 +381,7 @@ impl Budget {
         wanted.then(|| settings.find(fits)).flatten().map(|(asked, _)| asked)
     }
 
-    /// More than most times that are predicted like this: about one in four of those that scatter as the newest did lies
+    /// More than most times that are predicted like this: about one in five of those that scatter as the newest did lies
     /// above.
     fn cautious_ms(&self, outlook: &Outlook, setting: &Setting) -> f64 {
         let spread = (SPREADS * self.errors.spread()).exp();

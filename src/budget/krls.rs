@@ -1,19 +1,19 @@
 //! Kernel recursive least squares: regression from examples that arrive one by one (Y. Engel, S. Mannor, R. Meir, The Kernel
 //! Recursive Least-Squares Algorithm, 2004), with approximate linear dependence as the test for what is new, a
-//! bounded dictionary and forgetting.
+//! bounded dictionary and numbers that change with time.
 
-/// What an example must be off the span of the dictionary, as a square in feature space, to join it.
-const LEAST_NOVELTY: f64 = 0.02;
+/// Variance that the dictionary must leave to an example for it to join: more than noise leaves to one that is there.
+const LEAST_NOVELTY: f64 = 0.055;
 /// Most examples in the dictionary; further ones change its weights only.
 const CAPACITY: usize = 64;
-/// Share of an old example's weight that stays with every new one.
-const MEMORY: f64 = 0.99;
 /// Added to the kernel's diagonal: variance of the examples' noise, a time's relative to that of what is learned.
 const NOISE: f64 = 0.05;
 /// Variance of what all numbers have in common, so that far from all examples their mean is predicted.
 const COMMON: f64 = 4.0;
-/// Variances do not grow beyond this while nothing is learned about a direction.
-const MOST_VARIANCE: f64 = 1e3;
+const _: () = assert!(LEAST_NOVELTY > NOISE);
+/// Variance by which what belongs to an example may change with every new one, relative to that of the noise: older ones count
+/// less and less.
+const CHANGE: f64 = 1e-3;
 
 /// Predicts a number from `N` features, each scaled so that a difference of 1 is a large one.
 #[derive(Clone, Debug, Default)]
@@ -54,8 +54,8 @@ fn grown(matrix: &[f64], size: usize, border: impl Fn(usize) -> f64, corner: f64
 }
 
 impl<const N: usize> Krls<N> {
-    /// The expected number, and how new the features are: 0 where they are in the dictionary's span, 1 far away from all
-    /// that was learned.
+    /// The expected number, and how new the features are: the variance that examples leave, from that of their noise to 1
+    /// far away from all that was learned.
     pub(crate) fn predict(&self, features: &[f64; N]) -> (f64, f64) {
         let k = self.kernels(features);
         let novelty = 1.0 + COMMON - dot(&k, &times(&self.inverse, &k));
@@ -99,17 +99,14 @@ impl<const N: usize> Krls<N> {
     fn correct(&mut self, a: &[f64], error: f64) {
         let size = a.len();
         let pa = times(&self.covariance, a);
-        let divisor = MEMORY + dot(a, &pa);
+        let divisor = 1.0 + dot(a, &pa);
         let gain: Vec<f64> = pa.iter().map(|pa| pa / divisor).collect();
         for row in 0..size {
             for column in 0..size {
                 let entry = &mut self.covariance[row * size + column];
                 *entry -= gain[row] * pa[column];
             }
-        }
-        let most = (0..size).map(|i| self.covariance[i * size + i]).fold(0.0, f64::max);
-        if most < MOST_VARIANCE {
-            self.covariance.iter_mut().for_each(|entry| *entry /= MEMORY);
+            self.covariance[row * size + row] += CHANGE;
         }
         for (weight, change) in self.weights.iter_mut().zip(times(&self.inverse, &gain)) {
             *weight += change * error;
@@ -174,9 +171,12 @@ mod tests {
     #[test]
     fn what_changes_is_learned_again() {
         let mut model = Krls::<1>::default();
-        for _ in 0..100 {
+        // Long enough for what was learned elsewhere to be uncertain again.
+        model.learn(&[9.0], 0.0);
+        for _ in 0..1500 {
             model.learn(&[0.5], 1.0);
         }
+        assert_eq!(model.dictionary.len(), 2, "an example joins once");
         for _ in 0..300 {
             model.learn(&[0.5], 2.0);
         }
