@@ -333,7 +333,10 @@ impl Budget {
     /// more pixels to fill, so time need not fall with them; from the least share on, the way is up again.
     fn fitting(&self, outlook: &Outlook, request: &Request<'_>) -> Fitting {
         let target_ms = request.target_ms;
-        let most = (self.asked / MOST_STEP).clamp(LEAST_SHARE, 1.0);
+        // Whatever is predicted, more rays do not follow too many.
+        let is_too_long = self.last.is_some_and(|last| last.ms > target_ms);
+        let growth = if is_too_long { 1.0 } else { 1.0 / MOST_STEP };
+        let most = (self.asked * growth).clamp(LEAST_SHARE, 1.0);
         let settings = (0..=CANDIDATES).map(|i| {
             let part = f64::from(i) / f64::from(CANDIDATES);
             let asked = (most * (LEAST_SHARE / most).powf(part)).max(LEAST_SHARE);
