@@ -377,8 +377,8 @@ impl Budget {
         mut settings: impl Iterator<Item = (f64, Setting)>,
     ) -> Option<f64> {
         let last = self.last.filter(|last| last.work > 0.0 && last.ms < ROOM * target_ms)?;
-        let spread = (SPREADS * self.errors.spread()).exp();
-        let ms_of = |setting: &Setting| last.ms * outlook.units(setting) / last.work * spread;
+        let kept_free = self.kept_free();
+        let ms_of = |setting: &Setting| last.ms * outlook.units(setting) / last.work * kept_free;
         let fits = |(_, setting): &(f64, Setting)| ms_of(setting) <= target_ms;
         let wanted = self.trial_in == 0;
         wanted.then(|| settings.find(fits)).flatten().map(|(asked, _)| asked)
@@ -387,9 +387,14 @@ impl Budget {
     /// More than most times that are predicted like this: about one in five of those that scatter as the newest did lies
     /// above.
     fn cautious_ms(&self, outlook: &Outlook, setting: &Setting) -> f64 {
-        let spread = (SPREADS * self.errors.spread()).exp();
+        let kept_free = self.kept_free();
         self.predict(outlook, setting)
-            .map_or(f64::INFINITY, |(ms, novelty)| ms * (1.0 + CAUTION * novelty) * spread)
+            .map_or(f64::INFINITY, |(ms, novelty)| ms * (1.0 + CAUTION * novelty) * kept_free)
+    }
+
+    /// What predictions are multiplied by, so that typical errors stay below a target.
+    fn kept_free(&self) -> f64 {
+        (SPREADS * self.errors.spread()).exp()
     }
 
     /// Milliseconds, and how new this is.

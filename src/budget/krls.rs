@@ -148,6 +148,7 @@ mod tests {
         // Most of what is known far away is what all numbers have in common.
         let (found, novelty) = model.predict(&[9.0, 0.0]);
         assert!(novelty > 0.999 && (found - 3.0 * COMMON / (1.0 + COMMON)).abs() < 0.1, "{found}");
+        assert!(found > 2.0, "{found}");
     }
 
     #[test]
