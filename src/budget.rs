@@ -19,7 +19,7 @@ use web_time::Instant;
 
 use errors::Errors;
 use krls::Krls;
-use outlook::{FEATURES, Outlook};
+use outlook::{Features, KINDS, LIKENESS, Outlook};
 use work::PrePass;
 
 pub(crate) use setting::{STEPS, Sampling, Setting, step_index};
@@ -86,8 +86,8 @@ pub(crate) struct Request<'a> {
 /// What a frame's setting was chosen by, to learn from its time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Choice {
-    features: [f64; FEATURES],
-    /// 0 without a pre-pass.
+    /// Those without a pre-pass are not learned from, as their work is 0.
+    features: Features,
     work: f64,
     pub(crate) setting: Setting,
     /// The share that was asked for: about that of the setting; and whether to find out what it takes.
@@ -126,7 +126,7 @@ pub(crate) struct Budget {
     cached: bool,
     ranges: ReadbackRing,
     pre_pass: Option<PrePass>,
-    model: Krls<FEATURES>,
+    model: Krls<LIKENESS, KINDS>,
     /// Logarithm of the milliseconds per unit of work of the first frame that was measured.
     level: Option<f64>,
     /// The newest frame that was measured, and the share that was asked for last.
@@ -243,7 +243,8 @@ impl Budget {
         };
         let setting = Setting::new(asked, request.steps);
         self.asked = asked;
-        let (mut features, mut units, mut predicted_ms) = ([0.0; FEATURES], 0.0, None);
+        let mut features = Features { local: [0.0; LIKENESS], linear: [0.0; KINDS] };
+        let (mut units, mut predicted_ms) = (0.0, None);
         if let Some(outlook) = &outlook {
             (features, units) = (outlook.features(&setting), outlook.units(&setting));
             predicted_ms = self.predict(outlook, &setting).map(|(ms, _)| ms);

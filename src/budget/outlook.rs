@@ -1,11 +1,17 @@
 //! What is known of a frame before its setting is chosen: what its first pass has to do.
 
 use super::Request;
+use super::krls;
 use super::setting::{Setting, squared};
 use super::work::Work;
 
-/// Number of features.
-pub(super) const FEATURES: usize = 10;
+/// Numbers of features that say what a frame is like, and of kinds of work.
+pub(super) const LIKENESS: usize = 9;
+pub(super) const KINDS: usize = 6;
+/// What the cost per unit of work depends on: what the frame is like, and the shares of the kinds of work, since each of them has a
+/// cost of its own on every machine.
+pub(super) type Features = krls::Features<LIKENESS, KINDS>;
+
 /// Work of starting a ray, of going on with one from a preview, of filling a pixel, of making a pixel from a preview and of
 /// decoding a coarse cell, in visits of a block, before anything was learned.
 const START_WORK: f64 = 0.27;
@@ -25,7 +31,7 @@ pub(super) struct Outlook {
     filled: f64,
     decoded: f64,
     /// But for what follows from the setting.
-    features: [f64; FEATURES],
+    local: [f64; LIKENESS],
 }
 
 impl Outlook {
@@ -44,7 +50,7 @@ impl Outlook {
             cast: pixels * work.entered * (1.0 + work.visited),
             filled: if fills { pixels * work.entered * FILL_WORK } else { 0.0 },
             decoded: fresh * work.in_sight * DECODE_WORK * ahead,
-            features: [
+            local: [
                 0.0,
                 (1.0 + work.visited).ln(),
                 work.entered,
@@ -52,41 +58,37 @@ impl Outlook {
                 2.0 * fresh,
                 0.3 * f64::from(look_ahead.max(1)).ln(),
                 0.3 * voxels_per_pixel.ln(),
-                0.0,
                 0.4 * direction[0],
                 0.4 * direction[1],
             ],
         }
     }
 
-    /// What a setting costs whatever its rays meet: rays are started, pictures made from previews.
-    fn fixed(&self, setting: &Setting) -> f64 {
+    /// Work of every kind: rays are started, those of a preview gone on with, pictures made from previews, rays cast, pixels filled
+    /// and blocks decoded.
+    pub(super) fn parts(&self, setting: &Setting) -> [f64; KINDS] {
+        let Setting { first, last, share } = *setting;
         let rays = |step| self.pixels / squared(step);
-        let mut work = rays(setting.first) * START_WORK;
-        if setting.last < setting.first {
-            work += rays(setting.last) * RESUME_WORK;
-        }
-        if setting.last > 1 {
-            work += self.pixels * UPSCALE_WORK;
-        }
-        work
+        // Whoever goes on from a preview has cast all of it.
+        let open = (1.0 / squared(first) - share).max(0.0);
+        [
+            rays(first) * START_WORK,
+            if last < first { rays(last) * RESUME_WORK } else { 0.0 },
+            if last > 1 { self.pixels * UPSCALE_WORK } else { 0.0 },
+            share * self.cast,
+            open * self.filled,
+            share.sqrt() * self.decoded,
+        ]
     }
 
     /// Work in visits of a block.
     pub(super) fn units(&self, setting: &Setting) -> f64 {
-        let all = squared(setting.first);
-        // Whoever goes on from a preview has cast all of it.
-        let open = (1.0 - setting.share * all).max(0.0);
-        self.fixed(setting)
-            + setting.share * self.cast
-            + open * self.filled / all
-            + setting.share.sqrt() * self.decoded
+        self.parts(setting).iter().sum()
     }
 
-    pub(super) fn features(&self, setting: &Setting) -> [f64; FEATURES] {
-        let mut features = self.features;
-        features[0] = 0.7 * setting.share.ln();
-        features[7] = 0.5 * self.fixed(setting).ln();
-        features
+    pub(super) fn features(&self, setting: &Setting) -> Features {
+        let (mut local, units) = (self.local, self.units(setting));
+        local[0] = 0.7 * setting.share.ln();
+        Features { local, linear: self.parts(setting).map(|part| part / units) }
     }
 }

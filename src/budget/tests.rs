@@ -242,6 +242,35 @@ fn what_was_never_tried_costs_as_much_for_its_work_as_what_was() {
 }
 
 #[test]
+fn every_kind_of_work_has_a_cost_of_its_own() {
+    let (mut budget, mut scatter) = (budget(BudgetMode::Predicted), noise(4));
+    // Starting and going on are cheap, rays are not.
+    let costs = [4e-6, 2e-6, 1e-5, 2e-5, 1e-5, 1e-5];
+    for i in 0..60 {
+        let view = view(2.0 * f64::from(i), 0.9 + 0.1 * (f64::from(i) * 0.3).sin());
+        let request = Request { steps: &[1, 2, 4], fills: true, ..request(&view, 1e3) };
+        let choice = budget.choose(&request);
+        let work = budget.pre_pass.as_mut().map(|pre| pre.estimate(&view, SIZE, 0.5)).unwrap();
+        let outlook = Outlook::new(&request, &work, false);
+        let ms_of = |setting: &Setting| -> f64 {
+            outlook.parts(setting).iter().zip(costs).map(|(part, cost)| part * cost).sum()
+        };
+        if i > 30 {
+            // More rays than ever.
+            let more = Setting::new(0.45, &[1, 2, 4]);
+            let (ms, _) = budget.predict(&outlook, &more).unwrap();
+            let error = (ms / ms_of(&more)).ln();
+            assert!(error.abs() < 0.1, "seed 4, frame {i}: {ms} for {} ms", ms_of(&more));
+        }
+        // From a part of every fourth pixel to a few more than every second one.
+        let known = Setting::new(0.04 * 8.0_f64.powf(scatter()), &[1, 2, 4]);
+        let ms = ms_of(&known) * (0.1 * (scatter() - 0.5)).exp();
+        let (features, work) = (outlook.features(&known), outlook.units(&known));
+        budget.learn(&Choice { features, work, setting: known, ..choice }, ms);
+    }
+}
+
+#[test]
 fn a_machine_that_becomes_slower_is_followed_within_three_frames() {
     let mut budget = budget(BudgetMode::Predicted);
     for i in 0..60 {
