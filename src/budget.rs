@@ -59,6 +59,8 @@ const MOST_STEP: f64 = 0.8;
 const CAUTION: f64 = 0.5;
 /// Part of a target below which the frame before leaves room for a trial, and frames from one that took too long to the next.
 const ROOM: f64 = 0.85;
+/// How new something is at least that hardly anything is known of.
+const NEW: f64 = 0.2;
 const LEAST_WAIT: u32 = 4;
 const MOST_WAIT: u32 = 64;
 /// As many typical errors of predictions are kept free below a target.
@@ -294,8 +296,8 @@ impl Budget {
         let Setting { first, last, .. } = choice.setting;
         if !self.steps_seen.contains(&[first, last]) {
             self.steps_seen.push([first, last]);
-            if first > 1 {
-                // Drivers finish compiling kernels when they first run.
+            if first > 1 && choice.predicted_ms.is_none_or(|predicted| ms > predicted) {
+                // Drivers finish compiling kernels when they first run, so it may take less from now on.
                 return;
             }
         }
@@ -370,7 +372,8 @@ impl Budget {
     }
 
     /// The largest share that fits if it costs as much per unit of work as the frame before, where that one left much room
-    /// and it is time to try: what was never tried, or was slow once for another reason, would never be tried else.
+    /// and it is time to try: what was never tried, or was slow once for another reason, would never be tried else. Of what
+    /// is new, the least share with the same steps, which teaches as much.
     fn trial(
         &self,
         outlook: &Outlook,
@@ -381,8 +384,14 @@ impl Budget {
         let kept_free = self.kept_free();
         let ms_of = |setting: &Setting| last.ms * outlook.units(setting) / last.work * kept_free;
         let fits = |(_, setting): &(f64, Setting)| ms_of(setting) <= target_ms;
-        let wanted = self.trial_in == 0;
-        wanted.then(|| settings.find(fits)).flatten().map(|(asked, _)| asked)
+        if self.trial_in > 0 {
+            return None;
+        }
+        let (most, tried) = settings.find(fits)?;
+        let (_, novelty) = self.predict(outlook, &tried)?;
+        let is_alike = |(_, s): &(f64, Setting)| [s.first, s.last] == [tried.first, tried.last];
+        let least = settings.take_while(is_alike).last().filter(|_| novelty > NEW);
+        Some(least.map_or(most, |(least, _)| least))
     }
 
     /// More than most times that are predicted like this: about one in five of those that scatter as the newest did lies
