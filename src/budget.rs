@@ -59,10 +59,10 @@ const MOST_STEP: f64 = 0.8;
 const CAUTION: f64 = 0.5;
 /// Part of a target below which the frame before leaves room for a trial, and frames from one that took too long to the next.
 const ROOM: f64 = 0.85;
-/// How new something is at least that hardly anything is known of.
-const NEW: f64 = 0.2;
 const LEAST_WAIT: u32 = 4;
 const MOST_WAIT: u32 = 64;
+/// How new something is at least that was not tried before.
+const NEW: f64 = 0.1;
 /// As many typical errors of predictions are kept free below a target.
 const SPREADS: f64 = 1.0;
 /// Part of a time that is clearly less.

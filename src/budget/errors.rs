@@ -1,7 +1,5 @@
 //! How far predictions are off, and which of that is to be learned.
 
-use super::NEW;
-
 /// Typical error before any was seen, and how much the newest counts.
 const FIRST_SPREAD: f64 = 0.05;
 const SPREAD_RATE: f64 = 0.1;
@@ -14,6 +12,8 @@ const SURPRISE: f64 = 2.0;
 /// How much of the newest error the drift takes in, and how much of it stays from frame to frame, since the model learns, too.
 const DRIFT_RATE: f64 = 0.3;
 const DRIFT_KEPT: f64 = 0.9;
+/// What is newer than this says little about the machine.
+const MOST_NOVELTY: f64 = 0.2;
 
 /// Errors of predictions, as logarithms of times over predicted ones.
 #[derive(Clone, Copy, Debug)]
@@ -53,8 +53,7 @@ impl Errors {
         self.spread += SPREAD_RATE * (1.0 - novelty) * (counted - self.spread);
         self.spread = self.spread.max(LEAST_SPREAD);
         let learned = self.learned(error, expected);
-        // What is new says little about the machine.
-        let taken = if novelty < NEW { DRIFT_RATE * learned } else { 0.0 };
+        let taken = if novelty < MOST_NOVELTY { DRIFT_RATE * learned } else { 0.0 };
         self.drift = DRIFT_KEPT * (self.drift + taken);
         learned
     }

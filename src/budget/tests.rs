@@ -214,6 +214,55 @@ fn what_was_slow_once_is_tried_again() {
 }
 
 #[test]
+fn a_first_frame_with_a_preview_counts_if_it_takes_less_than_predicted() {
+    let mut budget = budget(BudgetMode::Predicted);
+    let view = view(0.0, 1.0);
+    let choice = budget.choose(&Request { steps: &[1, 2, 4], ..request(&view, 30.0) });
+    let ms_after = |budget: &mut Budget, share: f64, predicted_ms, ms| {
+        let mut choice = choice;
+        (choice.setting, choice.predicted_ms) = (Setting::new(share, &[1, 2, 4]), predicted_ms);
+        budget.learn(&choice, ms);
+        budget.last.map(|last| last.ms)
+    };
+    assert_eq!(ms_after(&mut budget, 0.05, None, 5.0), None, "nothing was predicted");
+    assert_eq!(ms_after(&mut budget, 0.05, None, 6.0), Some(6.0), "the second one");
+    assert_eq!(ms_after(&mut budget, 0.1, Some(10.0), 11.0), Some(6.0), "it may be compiling");
+    assert_eq!(ms_after(&mut budget, 0.1, Some(10.0), 12.0), Some(12.0), "the second one");
+    assert_eq!(
+        ms_after(&mut budget, 0.25, Some(10.0), 9.0),
+        Some(9.0),
+        "nothing else is this quick"
+    );
+    // Without previews nothing runs for the first time.
+    assert_eq!(ms_after(&mut budget, 1.0, Some(10.0), 14.0), Some(14.0));
+}
+
+#[test]
+fn what_is_new_is_tried_with_the_least_share() {
+    let mut budget = budget(BudgetMode::Predicted);
+    let view = view(0.0, 1.0);
+    let request = Request { steps: &[1, 2, 4], fills: true, ..request(&view, 30.0) };
+    let work = budget.pre_pass.as_mut().map(|pre| pre.estimate(&view, SIZE, 0.5)).unwrap();
+    let outlook = Outlook::new(&request, &work, false);
+    let setting = |asked| (asked, Setting::new(asked, request.steps));
+    // After all rays of every second pixel, at whose cost 0.3 of all rays take what there is.
+    let (_, known) = setting(0.25);
+    let wanted = [0.33, 0.3, 0.27, 0.251, 0.24].map(setting);
+    let work = 0.5 * outlook.units(&wanted[1].1);
+    budget.level = Some(0.0);
+    budget.last = Some(Measured { asked: 0.25, ms: 15.0, work });
+    budget.model.learn(&outlook.features(&known), 0.0);
+    let tried =
+        |budget: &Budget| budget.trial(&outlook, 30.0 * budget.kept_free(), wanted.into_iter());
+    assert_eq!(tried(&budget), Some(0.251));
+    // What is known, with as many rays as fit.
+    budget.model.learn(&outlook.features(&wanted[2].1), 0.0);
+    assert_eq!(tried(&budget), Some(0.3));
+    budget.trial_in = 1;
+    assert_eq!(tried(&budget), None);
+}
+
+#[test]
 fn what_was_never_tried_costs_as_much_for_its_work_as_what_was() {
     let (mut budget, mut scatter) = (budget(BudgetMode::Predicted), noise(3));
     let other = Setting::new(0.3, &[1, 2, 4]);
