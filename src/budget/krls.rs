@@ -10,7 +10,7 @@ const CAPACITY: usize = 64;
 const NOISE: f64 = 0.05;
 /// Variance of what all numbers have in common, so that far from all examples their mean is predicted.
 const COMMON: f64 = 4.0;
-/// Variance of how numbers grow with a linear feature, wherever they are.
+/// Variance of how numbers grow with a linear feature, wherever they are: for logarithms of costs, about a factor of two.
 const GROWTH: f64 = 0.5;
 const _: () = assert!(LEAST_NOVELTY > NOISE);
 /// Variance by which what belongs to an example may change with every new one, relative to that of the noise: older ones count
