@@ -296,7 +296,8 @@ impl Budget {
         let Setting { first, last, .. } = choice.setting;
         if !self.steps_seen.contains(&[first, last]) {
             self.steps_seen.push([first, last]);
-            if first > 1 && choice.predicted_ms.is_none_or(|predicted| ms > predicted) {
+            let is_quick = choice.predicted_ms.is_some_and(|predicted| ms <= predicted);
+            if first > 1 && !(self.mode == BudgetMode::Predicted && is_quick) {
                 // Drivers finish compiling kernels when they first run, so it may take less from now on.
                 return;
             }

@@ -233,6 +233,12 @@ fn a_first_frame_with_a_preview_counts_if_it_takes_less_than_predicted() {
         Some(9.0),
         "nothing else is this quick"
     );
+    budget.mode = BudgetMode::LastFrame;
+    assert_eq!(
+        ms_after(&mut budget, 0.5, Some(10.0), 8.0),
+        Some(9.0),
+        "predictions decide nothing"
+    );
     // Without previews nothing runs for the first time.
     assert_eq!(ms_after(&mut budget, 1.0, Some(10.0), 14.0), Some(14.0));
 }
