@@ -381,13 +381,13 @@ impl Budget {
         target_ms: f64,
         mut settings: impl Iterator<Item = (f64, Setting)>,
     ) -> Option<f64> {
+        if self.trial_in > 0 {
+            return None;
+        }
         let last = self.last.filter(|last| last.work > 0.0 && last.ms < ROOM * target_ms)?;
         let kept_free = self.kept_free();
         let ms_of = |setting: &Setting| last.ms * outlook.units(setting) / last.work * kept_free;
         let fits = |(_, setting): &(f64, Setting)| ms_of(setting) <= target_ms;
-        if self.trial_in > 0 {
-            return None;
-        }
         let (most, tried) = settings.find(fits)?;
         let (_, novelty) = self.predict(outlook, &tried)?;
         let is_alike = |(_, s): &(f64, Setting)| [s.first, s.last] == [tried.first, tried.last];

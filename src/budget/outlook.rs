@@ -87,8 +87,9 @@ impl Outlook {
     }
 
     pub(super) fn features(&self, setting: &Setting) -> Features {
-        let (mut local, units) = (self.local, self.units(setting));
+        let (mut local, parts) = (self.local, self.parts(setting));
         local[0] = 0.7 * setting.share.ln();
-        Features { local, linear: self.parts(setting).map(|part| part / units) }
+        let units: f64 = parts.iter().sum();
+        Features { local, linear: parts.map(|part| part / units) }
     }
 }

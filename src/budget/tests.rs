@@ -29,6 +29,12 @@ fn request(view: &FrameView, target_ms: f64) -> Request<'_> {
     Request { view, size: SIZE, steps: &[1], isovalue: 0.5, look_ahead: 2, fills: false, target_ms }
 }
 
+fn outlook(budget: &mut Budget, request: &Request<'_>) -> Outlook {
+    let Request { view, size, isovalue, .. } = *request;
+    let work = budget.pre_pass.as_mut().map(|pre| pre.estimate(view, size, isovalue)).unwrap();
+    Outlook::new(request, &work, false)
+}
+
 /// Shows `frames` frames of a moving camera to a renderer whose times are `cost` of density and
 /// frame number, and returns densities and times.
 fn show(
@@ -248,8 +254,7 @@ fn what_is_new_is_tried_with_the_least_share() {
     let mut budget = budget(BudgetMode::Predicted);
     let view = view(0.0, 1.0);
     let request = Request { steps: &[1, 2, 4], fills: true, ..request(&view, 30.0) };
-    let work = budget.pre_pass.as_mut().map(|pre| pre.estimate(&view, SIZE, 0.5)).unwrap();
-    let outlook = Outlook::new(&request, &work, false);
+    let outlook = outlook(&mut budget, &request);
     let setting = |asked| (asked, Setting::new(asked, request.steps));
     // After all rays of every second pixel, at whose cost 0.3 of all rays take what there is.
     let (_, known) = setting(0.25);
@@ -279,8 +284,7 @@ fn what_was_never_tried_costs_as_much_for_its_work_as_what_was() {
         let view = view(2.0 * f64::from(i), distance + 0.1 * (f64::from(i) * 0.3).sin());
         let request = Request { steps: &[1, 2, 4], fills: true, isovalue, ..request(&view, 1e3) };
         let choice = budget.choose(&request);
-        let work = budget.pre_pass.as_mut().map(|pre| pre.estimate(&view, SIZE, isovalue)).unwrap();
-        let outlook = Outlook::new(&request, &work, false);
+        let outlook = outlook(&mut budget, &request);
         let of = |setting: &Setting| (outlook.features(setting), outlook.units(setting));
         if i > 10 {
             let (ms, _) = budget.predict(&outlook, &other).unwrap();
@@ -305,8 +309,7 @@ fn every_kind_of_work_has_a_cost_of_its_own() {
         let view = view(2.0 * f64::from(i), 0.9 + 0.1 * (f64::from(i) * 0.3).sin());
         let request = Request { steps: &[1, 2, 4], fills: true, ..request(&view, 1e3) };
         let choice = budget.choose(&request);
-        let work = budget.pre_pass.as_mut().map(|pre| pre.estimate(&view, SIZE, 0.5)).unwrap();
-        let outlook = Outlook::new(&request, &work, false);
+        let outlook = outlook(&mut budget, &request);
         let ms_of = |setting: &Setting| -> f64 {
             outlook.parts(setting).iter().zip(costs).map(|(part, cost)| part * cost).sum()
         };
